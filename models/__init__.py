@@ -1,0 +1,1 @@
+"""Crash models behind one protocol: pedestrian, vehicle, contact and the solvers."""

@@ -1,0 +1,1 @@
+"""Contact: force-penetration laws and the geometry of ellipsoids against surfaces."""

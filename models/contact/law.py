@@ -1,0 +1,143 @@
+"""Force-penetration law: loading curve, unloading line, permanent part and damping.
+
+The loading curve is piecewise linear and goes on with its last slope. From the largest penetration
+``d`` reached so far, with force ``F(d)``, the contact unloads and reloads along a straight line of
+slope ``ratio F(d) / d``; the line meets zero force at the permanent part ``d (1 - 1 / ratio)``. A
+viscous force acts while the penetration grows.
+
+Body and car deform in series: they carry the same force, their penetrations add and so do their
+elastic recoveries. Both stay piecewise linear, so the combined law is exact (this is MADYMO's
+"combined" contact characteristic, in closed form).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.compilation import inlined_kernel, kernel
+
+Array = NDArray[np.float64]
+
+KNOTS = 10
+"""Knots that a combined law can hold."""
+
+DAMPING_ONSET = 0.005
+"""Penetration (m) over which the damping of a crash contact fades in (assumed: thin against the
+20 to 90 mm of a vehicle zone, so that the force has no jump at first touch)."""
+
+# Columns of a combined law.
+PENETRATION, FORCE, RECOVERY, SURFACE = 0, 1, 2, 3
+
+
+@dataclass(frozen=True)
+class ForceCurve:
+    """One side of a contact.
+
+    Attributes
+    ----------
+    penetration, force : (k,) m and N, rising from (0, 0).
+    unloading_ratio : unloading slope over secant slope at the largest penetration, > 1.
+    damping : N s/m, while loading.
+    """
+
+    penetration: Array
+    force: Array
+    unloading_ratio: float
+    damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        d, f = self.penetration, self.force
+        if d.ndim != 1 or d.shape != f.shape or not 2 <= d.size <= KNOTS // 2:
+            raise ValueError(f"a force curve takes 2 to {KNOTS // 2} knots, given {d.shape}")
+        if d[0] != 0.0 or f[0] != 0.0 or np.any(np.diff(d) <= 0.0) or np.any(np.diff(f) <= 0.0):
+            raise ValueError("a force curve starts at (0, 0) and rises strictly in both columns")
+        if self.unloading_ratio <= 1.0 or self.damping < 0.0:
+            raise ValueError("unloading_ratio must exceed 1 and damping must not be negative")
+
+    def scaled(self, force: float = 1.0, penetration: float = 1.0) -> "ForceCurve":
+        """Return the curve with forces and penetrations multiplied by the given factors."""
+        return ForceCurve(
+            self.penetration * penetration,
+            self.force * force,
+            self.unloading_ratio,
+            self.damping * force / penetration,
+        )
+
+    def at(self, penetration: Array) -> Array:
+        """Return the loading force (N) at penetrations (m) of any shape."""
+        d, f = self.penetration, self.force
+        slope = (f[-1] - f[-2]) / (d[-1] - d[-2])
+        beyond = np.maximum(penetration - d[-1], 0.0)
+        return np.asarray(np.interp(penetration, d, f) + slope * beyond)
+
+
+@kernel
+def combine_curves(surface_d, surface_f, surface_ratio, body_d, body_f, body_ratio, out):  # type: ignore[no-untyped-def]
+    """Write the law of two curves in series into ``out`` (KNOTS, 4) and return its knot count.
+
+    Columns: penetration (m), force (N), elastic recovery (m), penetration of the surface (m).
+    """
+    ns, nb = surface_d.size, body_d.size
+    i, j, n = 1, 1, 0
+    out[0, :] = 0.0
+    while i < ns or j < nb:
+        # Next knot: the smaller force of the two sides.
+        if j >= nb or (i < ns and surface_f[i] <= body_f[j]):
+            force = surface_f[i]
+        else:
+            force = body_f[j]
+        a, b = min(i, ns - 1), min(j, nb - 1)
+        ds = surface_d[a - 1] + (force - surface_f[a - 1]) * (surface_d[a] - surface_d[a - 1]) / (
+            surface_f[a] - surface_f[a - 1]
+        )
+        db = body_d[b - 1] + (force - body_f[b - 1]) * (body_d[b] - body_d[b - 1]) / (
+            body_f[b] - body_f[b - 1]
+        )
+        n += 1
+        out[n, 0] = ds + db
+        out[n, 1] = force
+        out[n, 2] = ds / surface_ratio + db / body_ratio
+        out[n, 3] = ds
+        if i < ns and surface_f[i] <= force:
+            i += 1
+        if j < nb and body_f[j] <= force:
+            j += 1
+    return n + 1
+
+
+@inlined_kernel
+def interpolate_law(laws, law, count, column, penetration):  # type: ignore[no-untyped-def]
+    """Return a column of combined law ``law`` at ``penetration`` (m); the last slope goes on."""
+    k = 1
+    while k < count - 1 and penetration > laws[law, k, 0]:
+        k += 1
+    x0 = laws[law, k - 1, 0]
+    y0 = laws[law, k - 1, column]
+    return y0 + (laws[law, k, column] - y0) * (penetration - x0) / (laws[law, k, 0] - x0)
+
+
+@inlined_kernel
+def contact_force(laws, law, count, damping, onset, penetration, rate, largest):  # type: ignore[no-untyped-def]
+    """Return the elastic and the damping force (N) of a contact.
+
+    Parameters
+    ----------
+    laws : (m, KNOTS, 4), law : row, count : knots used.
+    damping : N s/m. onset : m, penetration over which damping fades in (0: at once).
+    penetration, rate, largest : m, m/s, m; ``largest`` already includes ``penetration``.
+    """
+    top = interpolate_law(laws, law, count, 1, largest)
+    if penetration >= largest:
+        elastic = top
+    else:
+        recovery = interpolate_law(laws, law, count, 2, largest)
+        elastic = top * (penetration - largest + recovery) / recovery
+        if elastic < 0.0:
+            elastic = 0.0
+    viscous = 0.0
+    if rate > 0.0 and damping > 0.0:
+        viscous = damping * rate
+        if penetration < onset:
+            viscous *= penetration / onset
+    return elastic, viscous

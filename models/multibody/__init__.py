@@ -1,0 +1,1 @@
+"""The three-dimensional multibody core: ellipsoid segments, spherical joints, compliant contact."""

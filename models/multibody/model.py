@@ -1,0 +1,204 @@
+"""The multibody crash model behind the model protocol."""
+
+import functools
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models import data
+from models.multibody import outcome
+from models.multibody.setup import Crash, build_crash
+from models.multibody.simulation import (
+    END_REASONS,
+    S_FRAMES,
+    S_REASON,
+    S_RECORDS,
+    SUMMARY,
+    R_ZONES,
+    Settings,
+    empty_scratch,
+    simulate,
+    stable_ticks,
+)
+from models.multibody.surfaces import CHANNELS, empty_contacts
+from models.multibody.tree import empty_loads
+from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
+from models.protocol import OK, Batch, Input, Output, Run, complete_inputs
+from models.vehicle.profile import Vehicle, load_vehicle
+
+Array = NDArray[np.float64]
+
+TICK = 1e-4
+"""Default finest step (s): HIC15 is within 0.2 % of its value at a quarter of it."""
+COARSE, FLIGHT = 3, 6
+"""Ticks a step in quiet contact and in free flight."""
+TIME_LIMIT = 12.0
+"""s of crash after which a run counts as failed."""
+FRAME_INTERVAL = 2e-3
+"""s between frames of a scene."""
+
+NO_CONTACT = "no_contact"
+NO_HEAD_CONTACT = "no_head_contact"
+
+
+@functools.cache
+def _table() -> dict[str, object]:
+    return data.load("multibody.toml")
+
+
+@functools.cache
+def _inputs() -> tuple[Input, ...]:
+    rows = data.load("multibody.toml")["inputs"]
+    return tuple(
+        Input(name, r["unit"], r["meaning"], r["nominal"], *r["range"], r["source"])
+        for name, r in rows.items()
+    )
+
+
+@functools.cache
+def _outputs() -> tuple[Output, ...]:
+    return tuple(Output(name, *row) for name, row in data.load("multibody.toml")["outputs"].items())
+
+
+class MultibodyModel:
+    """Fifteen ellipsoid segments with spherical joints against a braking car.
+
+    Parameters
+    ----------
+    vehicle : str
+        Name of a vehicle of the data folder.
+    tick : float
+        Finest step in s.
+
+    Raises
+    ------
+    ValueError
+        If the vehicle is unknown or the step is not within 1 us to 0.2 ms.
+    """
+
+    name = "multibody"
+    effects: tuple[str, ...] = ()
+    partial_status = frozenset({NO_HEAD_CONTACT})
+
+    def __init__(self, vehicle: str = "family_car_1990s", tick: float = TICK) -> None:
+        if not 1e-6 <= float(tick) <= 2e-4:
+            raise ValueError(f"tick must lie within 1e-6 and 2e-4 s, given {tick}")
+        self.vehicle: Vehicle = load_vehicle(vehicle)
+        self.tick = float(tick)
+        n, zones = len(SEGMENTS), len(self.vehicle.zones)
+        self._record = np.empty((int(TIME_LIMIT / self.tick) + 2, R_ZONES + zones + 1))
+        self._frames = np.empty((int(TIME_LIMIT / FRAME_INTERVAL) + 2, 4 + 7 * n))
+
+    @property
+    def version(self) -> str:
+        """Version of the model's data and equations."""
+        return str(_table()["version"])
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """Inputs in order."""
+        return _inputs()
+
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """Outputs in order."""
+        return _outputs()
+
+    def run(self, inputs: Mapping[str, float]) -> Run:
+        """Run once, with time histories and scene.
+
+        Raises
+        ------
+        ValueError
+            If an input is unknown or outside its range.
+        """
+        values = complete_inputs(self, inputs)
+        raw = self._simulate(values)
+        if raw is None:
+            return Run(values, NO_CONTACT, NO_CONTACT, self._empty())
+        status, outputs = self._judge(raw)
+        return Run(
+            values,
+            status,
+            END_REASONS[int(raw.summary[S_REASON])],
+            outputs,
+            outcome.histories(raw),
+            outcome.scene(raw),
+        )
+
+    def run_batch(self, rows: Array) -> Batch:
+        """Run rows of inputs.
+
+        Parameters
+        ----------
+        rows : (n, inputs) in the order of ``inputs``, SI units.
+
+        Raises
+        ------
+        ValueError
+            If the array has another number of columns or a value outside its range.
+        """
+        rows = np.asarray(rows, dtype=np.float64)
+        names = [item.name for item in self.inputs]
+        if rows.ndim != 2 or rows.shape[1] != len(names):
+            raise ValueError(f"rows must have shape (n, {len(names)}), given {rows.shape}")
+        table = np.full((rows.shape[0], len(self.outputs)), np.nan)
+        status = []
+        for k, row in enumerate(rows):
+            raw = self._simulate(complete_inputs(self, dict(zip(names, row.tolist(), strict=True))))
+            if raw is None:
+                status.append(NO_CONTACT)
+                continue
+            word, outputs = self._judge(raw)
+            status.append(word)
+            table[k] = [outputs[item.name] for item in self.outputs]
+        return Batch(table, status)
+
+    def _empty(self) -> dict[str, float]:
+        return dict.fromkeys((item.name for item in self.outputs), math.nan)
+
+    def _judge(self, raw: outcome.Raw) -> tuple[str, dict[str, float]]:
+        """Return the status of a run and its outputs."""
+        reason = END_REASONS[int(raw.summary[S_REASON])]
+        if not reason.startswith("rest"):
+            return reason, self._empty()
+        outputs = self._empty() | outcome.measure(raw)
+        if math.isnan(outputs["head_impact_time"]):
+            return NO_HEAD_CONTACT, outputs
+        if not all(math.isfinite(value) for value in outputs.values()):
+            return "not_finite", self._empty()
+        return OK, outputs
+
+    def _simulate(self, values: dict[str, float]) -> outcome.Raw | None:
+        crash = build_crash(values, self.vehicle)
+        return None if crash is None else self._step(crash, values)
+
+    def _step(self, crash: Crash, values: dict[str, float]) -> outcome.Raw:
+        n, zones = len(SEGMENTS), len(self.vehicle.zones)
+        settings = Settings(
+            tick=self.tick,
+            coarse=stable_ticks(crash.tree, crash.joints, self.tick, COARSE),
+            flight=stable_ticks(crash.tree, crash.joints, self.tick, FLIGHT),
+            time_limit=TIME_LIMIT,
+            step_limit=self._record.shape[0] - 1,
+            frame_every=round(FRAME_INTERVAL / self.tick),
+            head=HEAD,
+            trunk=max(TRUNK),
+        )
+        work, head_contact, summary = np.zeros(CHANNELS), np.full(10, np.nan), np.zeros(SUMMARY)
+        simulate(
+            crash.tree, crash.joints, crash.ellipsoids, crash.zones, crash.car_motion, settings,
+            crash.motion, empty_loads(n), empty_contacts(n, zones, len(crash.ellipsoids.pairs)),
+            empty_scratch(n), work, self._record, self._frames, head_contact, summary,
+        )  # fmt: skip
+        return outcome.Raw(
+            crash=crash,
+            dive_angle=values["dive_angle"],
+            record=self._record[: int(summary[S_RECORDS])],
+            frames=self._frames[: int(summary[S_FRAMES])],
+            work=work,
+            head_contact=head_contact,
+            summary=summary,
+        )

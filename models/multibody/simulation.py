@@ -1,0 +1,409 @@
+"""The step loop: from first contact to rest on the road."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.compilation import inlined_kernel, kernel
+from models.criteria.units import STANDARD_GRAVITY
+from models.multibody.integration import correct, predict
+from models.multibody.joints import (
+    FRICTION_RATE,
+    TWIST_FRICTION,
+    Joints,
+    apply_joint_torques,
+)
+from models.multibody.surfaces import (
+    CHANNELS,
+    apply_car_contacts,
+    apply_road_contacts,
+    apply_self_contacts,
+    update_centres,
+)
+from models.multibody.tree import (
+    Tree,
+    centre_acceleration,
+    solve_accelerations,
+    update_kinematics,
+)
+from models.vehicle.motion import car_state
+
+Array = NDArray[np.float64]
+
+REST, REST_ON_CAR, TIME_LIMIT, STEP_LIMIT, NOT_FINITE = range(5)
+END_REASONS = ("rest_on_road", "rest_on_car", "time_limit", "step_limit", "not_finite")
+
+REST_SPEED = 0.05
+"""Speed (m/s) of the centre of gravity below which the body counts as at rest (assumed; at 0.6 g
+it would slide 0.2 mm further)."""
+REST_SPREAD = 0.3
+"""Root mean square segment speed (m/s) that a body at rest may still have (assumed)."""
+REST_TIME = 0.03
+"""Time (s) for which both must hold (assumed)."""
+
+HEAD_NEAR = 0.03
+"""Distance (m) from a car zone within which the head is stepped finely (assumed)."""
+HEAD_SPEED = 1.5
+"""Speed (m/s) relative to the car above which a head near it is stepped finely (assumed)."""
+HEAD_FALL = 0.3
+"""Vertical head speed (m/s) at the road above which its contact is stepped finely (assumed)."""
+HEAD_FORCE = 300.0
+"""Head force (N) on car or road above which its contact is stepped finely (assumed)."""
+
+# Columns of the record.
+R_TIME = 0
+R_ACCELERATION = 1  # 3: head, specific force, world, m/s2
+R_SPIN = 4  # 3: head angular velocity, own axes, rad/s
+R_SPIN_RATE = 7  # 3: head angular acceleration, own axes, rad/s2
+R_RELATIVE = 10  # 3: head velocity relative to the car front, car axes, m/s
+R_HEAD_CAR = 13  # head contact force with the car, N
+R_HEAD_ROAD = 14
+R_CENTRE = 15  # 3: centre of gravity, m
+R_ZONES = 18  # z + 1: normal force by zone, last the road, N
+
+# Entries of the summary.
+(
+    S_REASON,
+    S_TIME,
+    S_STEPS,
+    S_RECORDS,
+    S_FRAMES,
+    S_GROUND_TIME,
+    S_ENERGY_START,
+    S_ENERGY_END,
+    S_HEAD_ZONE,
+    S_HEAD_DEPTH,
+    S_CENTRE_SPEED,
+) = range(11)
+SUMMARY = 11
+
+
+class Scratch(NamedTuple):
+    """Workspace of the step loop."""
+
+    car: Array
+    power: Array
+    old_power: Array
+    old_spin: Array
+    old_alpha: Array
+    old_velocity: Array
+    old_acceleration: Array
+
+
+def empty_scratch(n: int) -> Scratch:
+    """Return the workspace for ``n`` segments."""
+    return Scratch(
+        np.zeros(6), np.zeros(CHANNELS), np.zeros(CHANNELS),
+        np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(3), np.zeros(3),
+    )  # fmt: skip
+
+
+class Settings(NamedTuple):
+    """How a run is stepped and recorded.
+
+    Attributes
+    ----------
+    tick : s, the finest step. coarse, flight : ticks a step in quiet contact and in free flight.
+    time_limit : s of crash. step_limit : steps.
+    frame_every : ticks between frames.
+    head : row of the head. trunk : highest row that counts as trunk.
+    """
+
+    tick: float
+    coarse: int
+    flight: int
+    time_limit: float
+    step_limit: int
+    frame_every: int
+    head: int
+    trunk: int
+
+
+def stable_ticks(tree: Tree, joints: Joints, tick: float, wanted: int) -> int:
+    """Return how many ticks, at most ``wanted``, a step may take with the damping of the joints.
+
+    The integrator is stable while a damping rate stays below 1 / step; half of that is allowed.
+    A segment's rate is the damping of its joints over its inertia, to which its children's masses
+    add about the transverse axes.
+    """
+    n = tree.mass.size
+    damping = joints.damping + joints.friction[:, None] / FRICTION_RATE * [
+        1.0,
+        1.0,
+        TWIST_FRICTION,
+    ]
+    total = damping.copy()
+    inertia = tree.inertia.copy()
+    lever = np.linalg.norm(tree.centre_from_joint, axis=1)
+    inertia[:, :2] += (tree.mass * lever**2)[:, None]
+    for i in range(1, n):
+        parent = tree.parent[i]
+        total[parent] += damping[i]
+        inertia[parent, :2] += tree.mass[i] * float(tree.joint_in_parent[i] @ tree.joint_in_parent[i])
+    rate = float((total / inertia)[1:].max())
+    return min(wanted, max(1, int(0.5 / (rate * tick))))
+
+
+@inlined_kernel
+def total_energy(tree, motion, gravity):  # type: ignore[no-untyped-def]
+    """Return kinetic plus gravitational energy (J) of the tree."""
+    energy = 0.0
+    for i in range(tree.mass.shape[0]):
+        m = tree.mass[i]
+        for k in range(3):
+            v = motion.velocity[i, k]
+            w = (
+                motion.rotation[i, 0, k] * motion.angular_velocity[i, 0]
+                + motion.rotation[i, 1, k] * motion.angular_velocity[i, 1]
+                + motion.rotation[i, 2, k] * motion.angular_velocity[i, 2]
+            )
+            energy += 0.5 * m * v * v + 0.5 * tree.inertia[i, k] * w * w
+        energy += m * gravity * motion.centre[i, 2]
+    return energy
+
+
+@inlined_kernel
+def evaluate(tree, joints, ellipsoids, zones, car, motion, loads, contacts, gravity, power):  # type: ignore[no-untyped-def]
+    """Fill loads and accelerations for the present state; write the powers (W) of all channels."""
+    for k in range(CHANNELS):
+        power[k] = 0.0
+    for j in range(contacts.zone_force.shape[0]):
+        contacts.zone_force[j] = 0.0
+    update_kinematics(tree, motion)
+    for i in range(tree.mass.shape[0]):
+        loads.force[i, 0] = 0.0
+        loads.force[i, 1] = 0.0
+        loads.force[i, 2] = -tree.mass[i] * gravity
+        loads.torque[i, 0] = 0.0
+        loads.torque[i, 1] = 0.0
+        loads.torque[i, 2] = 0.0
+    update_centres(ellipsoids, motion, contacts)
+    apply_joint_torques(tree, joints, motion, loads, power)
+    apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, power)
+    apply_road_contacts(zones, ellipsoids, motion, loads, contacts, tree, power)
+    apply_self_contacts(ellipsoids, motion, loads, contacts, tree, power)
+    solve_accelerations(tree, motion, loads)
+
+
+@inlined_kernel
+def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts):  # type: ignore[no-untyped-def]
+    """Return how many ticks the next step may take.
+
+    One while the head is fast near the car or meets the road; the settings say how many in free
+    flight and otherwise.
+    """
+    head = settings.head
+    reach = ellipsoids.reach[head]
+    wx, wy = contacts.centre[head, 0] - car[0], contacts.centre[head, 1] - car[1]
+    x = math.cos(car[2]) * wx + math.sin(car[2]) * wy
+    z = contacts.centre[head, 2]
+    ux = motion.velocity[head, 0] - car[3] + car[5] * wy
+    uy = motion.velocity[head, 1] - car[4] - car[5] * wx
+    uz = motion.velocity[head, 2]
+    fast = ux * ux + uy * uy + uz * uz > HEAD_SPEED * HEAD_SPEED
+    for j in range(zones.radius.shape[0]):
+        if contacts.segment_force[head, j] > HEAD_FORCE:
+            return 1
+        if fast and (
+            x < zones.box[j, 1] + reach + HEAD_NEAR
+            and x > zones.box[j, 0] - reach - HEAD_NEAR
+            and z < zones.box[j, 3] + reach + HEAD_NEAR
+            and z > zones.box[j, 2] - reach - HEAD_NEAR
+        ):
+            return 1
+    road = contacts.zone_force.shape[0] - 1
+    fall = -motion.velocity[head, 2]
+    if (z - reach < 2.0 * settings.flight * settings.tick * fall + 1e-3 and abs(fall) > HEAD_FALL) or (
+        contacts.segment_force[head, road] > HEAD_FORCE
+    ):
+        return 1
+    for j in range(road + 1):
+        if contacts.zone_force[j] > 0.0:
+            return settings.coarse
+    for i in range(motion.centre.shape[0]):
+        gap = contacts.centre[i, 2] - ellipsoids.reach[i]
+        if gap < -2.0 * settings.flight * settings.tick * motion.velocity[i, 2] + 1e-3:
+            return settings.coarse
+    return settings.flight
+
+
+@inlined_kernel
+def _write_record(row, time, head, tree, motion, loads, contacts, car, record):  # type: ignore[no-untyped-def]
+    record[row, R_TIME] = time
+    ax, ay, az = centre_acceleration(motion, loads, head)
+    record[row, R_ACCELERATION] = ax
+    record[row, R_ACCELERATION + 1] = ay
+    record[row, R_ACCELERATION + 2] = az + STANDARD_GRAVITY
+    for k in range(3):
+        w, q = 0.0, 0.0
+        for j in range(3):
+            w += motion.rotation[head, j, k] * motion.angular_velocity[head, j]
+            q += motion.rotation[head, j, k] * loads.angular_acceleration[head, j]
+        record[row, R_SPIN + k] = w
+        record[row, R_SPIN_RATE + k] = q
+    # Velocity of the head's centre of gravity relative to the car-fixed point where it is.
+    ux = motion.velocity[head, 0] - car[3] + car[5] * (motion.centre[head, 1] - car[1])
+    uy = motion.velocity[head, 1] - car[4] - car[5] * (motion.centre[head, 0] - car[0])
+    cosine, sine = math.cos(car[2]), math.sin(car[2])
+    record[row, R_RELATIVE] = cosine * ux + sine * uy
+    record[row, R_RELATIVE + 1] = -sine * ux + cosine * uy
+    record[row, R_RELATIVE + 2] = motion.velocity[head, 2]
+    zones = contacts.zone_force.shape[0] - 1
+    force = 0.0
+    for j in range(zones):
+        force += contacts.segment_force[head, j]
+        record[row, R_ZONES + j] = contacts.zone_force[j]
+    record[row, R_ZONES + zones] = contacts.zone_force[zones]
+    record[row, R_HEAD_CAR] = force
+    record[row, R_HEAD_ROAD] = contacts.segment_force[head, zones]
+    total = 0.0
+    for k in range(3):
+        record[row, R_CENTRE + k] = 0.0
+    for i in range(tree.mass.shape[0]):
+        total += tree.mass[i]
+        for k in range(3):
+            record[row, R_CENTRE + k] += tree.mass[i] * motion.centre[i, k]
+    for k in range(3):
+        record[row, R_CENTRE + k] /= total
+
+
+@inlined_kernel
+def _write_frame(row, time, motion, contacts, car, frames):  # type: ignore[no-untyped-def]
+    n = motion.orientation.shape[0]
+    frames[row, 0] = time
+    frames[row, 1], frames[row, 2], frames[row, 3] = car[0], car[1], car[2]
+    for i in range(n):
+        for k in range(3):
+            frames[row, 4 + 7 * i + k] = contacts.centre[i, k]
+        for k in range(4):
+            frames[row, 7 + 7 * i + k] = motion.orientation[i, k]
+
+
+@inlined_kernel
+def _speeds(tree, motion):  # type: ignore[no-untyped-def]
+    """Return the speed of the centre of gravity and the root mean square segment speed."""
+    total, square = 0.0, 0.0
+    px, py, pz = 0.0, 0.0, 0.0
+    for i in range(tree.mass.shape[0]):
+        m = tree.mass[i]
+        vx, vy, vz = motion.velocity[i, 0], motion.velocity[i, 1], motion.velocity[i, 2]
+        total += m
+        px += m * vx
+        py += m * vy
+        pz += m * vz
+        square += m * (vx * vx + vy * vy + vz * vz)
+    return math.sqrt(px * px + py * py + pz * pz) / total, math.sqrt(square / total)
+
+
+@kernel
+def simulate(
+    tree, joints, ellipsoids, zones, car_motion, settings,
+    motion, loads, contacts, scratch, work, record, frames, head_contact, summary,
+):  # type: ignore[no-untyped-def]  # fmt: skip
+    """Run from the present state to rest.
+
+    Parameters
+    ----------
+    tree, joints, ellipsoids, zones, car_motion, settings
+        Constant data.
+    motion, loads, contacts, scratch
+        State and workspace, changed in place.
+    work : (CHANNELS,) J, filled: work on the body by channel.
+    record : (rows, 18 + z + 1), frames : (rows, 4 + 7 n), filled.
+    head_contact : (10,), filled at the head's first contact with the car: time, velocity relative
+        to the car (3), normal (3); at its deepest: contact point (3), all in the car's frame.
+    summary : (SUMMARY,), filled.
+    """
+    gravity = STANDARD_GRAVITY
+    car, power, old_power = scratch.car, scratch.power, scratch.old_power
+    old_spin, old_alpha = scratch.old_spin, scratch.old_alpha
+    old_velocity, old_acceleration = scratch.old_velocity, scratch.old_acceleration
+    head = settings.head
+    road = zones.radius.shape[0]
+    time = 0.0
+    car_state(car_motion, time, car)
+    evaluate(tree, joints, ellipsoids, zones, car, motion, loads, contacts, gravity, power)
+    summary[S_ENERGY_START] = total_energy(tree, motion, gravity)
+    summary[S_GROUND_TIME] = math.inf
+    summary[S_HEAD_ZONE] = -1.0
+    rows, shots, steps, ticks = 0, 0, 0, 0
+    touched = False
+    quiet = 0.0
+    reason = TIME_LIMIT
+    while True:
+        if rows < record.shape[0]:
+            _write_record(rows, time, head, tree, motion, loads, contacts, car, record)
+            rows += 1
+        if ticks >= shots * settings.frame_every and shots < frames.shape[0]:
+            _write_frame(shots, time, motion, contacts, car, frames)
+            shots += 1
+        if time >= settings.time_limit:
+            break
+        if steps >= settings.step_limit:
+            reason = STEP_LIMIT
+            break
+        for k in range(CHANNELS):
+            old_power[k] = power[k]
+        jump = _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts)
+        h = jump * settings.tick
+        predict(motion, loads, old_spin, old_velocity, old_alpha, old_acceleration, h)
+        steps += 1
+        ticks += jump
+        time = ticks * settings.tick
+        car_state(car_motion, time, car)
+        evaluate(tree, joints, ellipsoids, zones, car, motion, loads, contacts, gravity, power)
+        correct(motion, loads, old_spin, old_velocity, old_alpha, old_acceleration, h)
+        for k in range(CHANNELS):
+            work[k] += 0.5 * h * (old_power[k] + power[k])
+        # The head on the car.
+        deepest = summary[S_HEAD_DEPTH]
+        for j in range(road):
+            if contacts.segment_force[head, j] <= 0.0:
+                continue
+            if not touched:
+                touched = True
+                ux = motion.velocity[head, 0] - car[3] + car[5] * (motion.centre[head, 1] - car[1])
+                uy = motion.velocity[head, 1] - car[4] - car[5] * (motion.centre[head, 0] - car[0])
+                cosine, sine = math.cos(car[2]), math.sin(car[2])
+                head_contact[0] = time
+                head_contact[1] = cosine * ux + sine * uy
+                head_contact[2] = -sine * ux + cosine * uy
+                head_contact[3] = motion.velocity[head, 2]
+                for k in range(3):
+                    head_contact[4 + k] = contacts.normal[head, j, k]
+            if contacts.largest[head, j] > deepest and summary[S_GROUND_TIME] == math.inf:
+                deepest = contacts.largest[head, j]
+                summary[S_HEAD_ZONE] = float(j)
+                for k in range(3):
+                    head_contact[7 + k] = contacts.point[head, j, k]
+        summary[S_HEAD_DEPTH] = deepest
+        # First landing of trunk or head.
+        if summary[S_GROUND_TIME] == math.inf:
+            for i in range(settings.trunk + 1):
+                if contacts.segment_force[i, road] > 0.0:
+                    summary[S_GROUND_TIME] = time
+            if contacts.segment_force[head, road] > 0.0:
+                summary[S_GROUND_TIME] = time
+        speed, spread = _speeds(tree, motion)
+        if not math.isfinite(spread):
+            reason = NOT_FINITE
+            break
+        quiet = quiet + h if speed < REST_SPEED and spread < REST_SPREAD else 0.0
+        if quiet >= REST_TIME:
+            reason = REST
+            break
+    update_kinematics(tree, motion)
+    speed, spread = _speeds(tree, motion)
+    if reason == REST:
+        for j in range(road):
+            if contacts.zone_force[j] > 0.0:
+                reason = REST_ON_CAR
+    summary[S_REASON] = float(reason)
+    summary[S_TIME] = time
+    summary[S_STEPS] = float(steps)
+    summary[S_RECORDS] = float(rows)
+    summary[S_FRAMES] = float(shots)
+    summary[S_ENERGY_END] = total_energy(tree, motion, gravity)
+    summary[S_CENTRE_SPEED] = speed

@@ -1,0 +1,1 @@
+"""The pedestrian: growth, anthropometry, joints, tissue and running posture."""

@@ -1,0 +1,163 @@
+"""Fifteen segments of a pedestrian, scaled from age, stature and mass.
+
+Proportions (mass shares, semi-axes and joint heights over stature) are interpolated in age between
+the reference bodies of ``data/pedestrians/segments.toml`` and held constant outside them. Lengths
+then follow stature, the two transverse semi-axes follow sqrt(mass / stature), so that density stays
+near that of the reference; a head mass given by hand is taken from or added to the head alone and
+the rest of the body is scaled to keep the total.
+"""
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models import data
+
+Array = NDArray[np.float64]
+
+SEGMENTS = (
+    "hip",
+    "abdomen",
+    "chest",
+    "neck",
+    "head",
+    "upper_arm_left",
+    "forearm_left",
+    "upper_arm_right",
+    "forearm_right",
+    "thigh_left",
+    "shank_left",
+    "foot_left",
+    "thigh_right",
+    "shank_right",
+    "foot_right",
+)
+PARENTS = (-1, 0, 1, 2, 3, 2, 5, 2, 7, 0, 9, 10, 0, 12, 13)
+HEAD = SEGMENTS.index("head")
+TRUNK = tuple(SEGMENTS.index(name) for name in ("hip", "abdomen", "chest"))
+
+
+def region_of(segment: str) -> str:
+    """Return the body region of a segment: its name without the side."""
+    return segment.removesuffix("_left").removesuffix("_right")
+
+
+@dataclass(frozen=True)
+class Body:
+    """A standing pedestrian; rows follow ``SEGMENTS``, lengths in m from the soles' midpoint.
+
+    Attributes
+    ----------
+    age, stature, body_mass : years, m, kg.
+    mass : (15,) kg. inertia : (15, 3) kg m2, principal, about the centre of mass.
+    semi_axes : (15, 3) m. centre : (15, 3) m, centres of mass. ellipsoid : (15, 3) m, centres of
+        the ellipsoids. joint : (15, 3) m, joints to the parents.
+    """
+
+    age: float
+    stature: float
+    body_mass: float
+    mass: Array
+    inertia: Array
+    semi_axes: Array
+    centre: Array
+    ellipsoid: Array
+    joint: Array
+
+
+@dataclass(frozen=True)
+class _Proportions:
+    age: float
+    mass: Array  # share of body mass
+    semi_axes: Array  # over _axis_scale
+    centre: Array
+    ellipsoid: Array
+    joint: Array
+
+
+def _axis_scale(stature: float, body_mass: float) -> Array:
+    """Return what semi-axes are proportional to: stature along a segment, build across it."""
+    scale = np.empty((len(SEGMENTS), 3))
+    scale[:, :2] = np.sqrt(body_mass / stature)
+    scale[:, 2] = stature
+    # The skull is bone: its breadth follows stature, not build.
+    scale[HEAD] = stature
+    return scale
+
+
+@functools.cache
+def _reference(name: str) -> _Proportions:
+    entry = data.load("pedestrians/segments.toml")[name]
+    stature, body_mass = entry["stature"], entry["body_mass"]
+    mass, semi, centre, ellipsoid, joint = [], [], [], [], []
+    for segment in SEGMENTS:
+        row = entry["segments"][region_of(segment)]
+        mirror = np.array([1.0, -1.0 if segment.endswith("_right") else 1.0, 1.0])
+        mass.append(row["mass"])
+        semi.append(row["semi_axes"])
+        centre.append(row["centre"] * mirror)
+        ellipsoid.append(row.get("ellipsoid", row["centre"]) * mirror)
+        joint.append(row["joint"] * mirror)
+    shares = np.array(mass)
+    axes = np.array(semi) / _axis_scale(stature, body_mass)
+    return _Proportions(
+        age=entry["age"],
+        mass=shares / shares.sum(),
+        semi_axes=axes,
+        centre=np.array(centre) / stature,
+        ellipsoid=np.array(ellipsoid) / stature,
+        joint=np.array(joint) / stature,
+    )
+
+
+def build_body(
+    age: float, stature: float, body_mass: float, head_mass: float | None = None
+) -> Body:
+    """Return the segments of a pedestrian.
+
+    Parameters
+    ----------
+    age : float
+        Years; chooses the proportions, from the 7-year-old's to the adult's.
+    stature, body_mass : float
+        m and kg.
+    head_mass : float, optional
+        kg; by default the share that goes with the age.
+
+    Raises
+    ------
+    ValueError
+        If a value is not positive or the head is heavier than half of the body.
+    """
+    if not (age > 0.0 and stature > 0.0 and body_mass > 0.0):
+        raise ValueError(
+            f"age, stature and body mass must be positive: {age}, {stature}, {body_mass}"
+        )
+    child, adult = _reference("child_7y"), _reference("adult_male")
+    share = min(max((age - child.age) / (adult.age - child.age), 0.0), 1.0)
+
+    def between(a: Array, b: Array) -> Array:
+        return (1.0 - share) * a + share * b
+
+    mass = between(child.mass, adult.mass) * body_mass
+    if head_mass is not None:
+        if not 0.0 < head_mass < 0.5 * body_mass:
+            raise ValueError(f"head mass {head_mass:g} kg does not fit a body of {body_mass:g} kg")
+        mass *= (body_mass - head_mass) / (body_mass - mass[HEAD])
+        mass[HEAD] = head_mass
+    axes = between(child.semi_axes, adult.semi_axes) * _axis_scale(stature, body_mass)
+    squares = axes**2
+    inertia = mass[:, None] / 5.0 * (squares.sum(axis=1, keepdims=True) - squares)
+    return Body(
+        age=age,
+        stature=stature,
+        body_mass=body_mass,
+        mass=mass,
+        inertia=inertia,
+        semi_axes=axes,
+        centre=between(child.centre, adult.centre) * stature,
+        ellipsoid=between(child.ellipsoid, adult.ellipsoid) * stature,
+        joint=between(child.joint, adult.joint) * stature,
+    )

@@ -1,0 +1,78 @@
+"""Joint resistance of a pedestrian, scaled from the 7-year-old reference."""
+
+import numpy as np
+
+from models import data
+from models.multibody.joints import Joints
+from models.multibody.rotation import axis_rotation, multiply
+from models.pedestrian.anthropometry import SEGMENTS, Body, region_of
+from models.pedestrian.scaling import scale_between
+
+NECK_JOINTS = ("neck", "head")
+
+
+def build_joints(
+    body: Body, *, neck_stiffness: float = 1.0, muscle_tone: float = 1.0
+) -> Joints:
+    """Return the resistance of the 14 joints of a body.
+
+    Parameters
+    ----------
+    body : Body
+    neck_stiffness : float
+        Factor on passive stiffness, stops and damping of the two neck joints.
+    muscle_tone : float
+        Factor on joint friction; 1 is the setting in which a joint just holds its limb.
+    """
+    table = data.load("pedestrians/joints.toml")
+    reference = data.load("pedestrians/segments.toml")["child_7y"]
+    scale = scale_between(body.stature, body.age, reference["stature"], reference["age"])
+    n = len(SEGMENTS)
+    joints = Joints(
+        centre=np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)),
+        half_range=np.full((n, 3), np.pi),
+        neutral=np.zeros((n, 3)),
+        stiffness_low=np.zeros((n, 3)),
+        stiffness_high=np.zeros((n, 3)),
+        stop_low=np.zeros((n, 3)),
+        stop_high=np.zeros((n, 3)),
+        damping=np.zeros((n, 3)),
+        friction=np.zeros(n),
+        onset=np.full(n, np.radians(table["stop_onset"])),
+    )
+    for i, segment in enumerate(SEGMENTS):
+        region = region_of(segment)
+        if i == 0:
+            continue
+        row = table["joints"][region]
+        factor = neck_stiffness if region in NECK_JOINTS else 1.0
+        middle = np.zeros(3)
+        for k, axis in enumerate("xyz"):
+            low, high = row["range"][axis]
+            stiff = row["stiffness"][axis]
+            stop = row["stop"][axis]
+            if segment.endswith("_right") and axis != "y":
+                low, high = -high, -low
+                stiff, stop = stiff[::-1], stop[::-1]
+            middle[k] = np.radians(0.5 * (low + high))
+            joints.half_range[i, k] = np.radians(0.5 * (high - low))
+            joints.neutral[i, k] = -middle[k]
+            joints.stiffness_low[i, k], joints.stiffness_high[i, k] = stiff
+            joints.stop_low[i, k], joints.stop_high[i, k] = stop
+        joints.centre[i] = multiply(
+            axis_rotation(0, middle[0]),
+            multiply(axis_rotation(1, middle[1]), axis_rotation(2, middle[2])),
+        )
+        moment = scale.moment * factor
+        for array in (
+            joints.stiffness_low,
+            joints.stiffness_high,
+            joints.stop_low,
+            joints.stop_high,
+        ):
+            array[i] *= moment
+        joints.damping[i] = np.array(row["damping"]) * scale.rotational_damping * factor
+        # Friction holds the limb's weight: it follows mass times length, not tissue.
+        weight = body.body_mass * body.stature / (reference["body_mass"] * reference["stature"])
+        joints.friction[i] = row["friction"] * weight * muscle_tone
+    return joints

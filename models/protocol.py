@@ -1,0 +1,172 @@
+"""What a crash model is: named inputs, named outputs, one run with histories, and batches.
+
+A model never raises for a row of inputs inside its ranges: a run that fails is a row with a status
+other than ``ok`` and NaN where an output has no value. A row of a batch depends on that row alone.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+OK = "ok"
+
+
+@dataclass(frozen=True)
+class Input:
+    """An input of a model.
+
+    Attributes
+    ----------
+    name, unit, meaning : str
+        The unit is the one that the model takes (SI).
+    nominal, low, high : float
+        Nominal value and valid range.
+    source : str
+        Where the nominal value comes from, with its label.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    nominal: float
+    low: float
+    high: float
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class Output:
+    """An output of a model: name, unit, meaning."""
+
+    name: str
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class History:
+    """Time histories on one time axis.
+
+    Attributes
+    ----------
+    time : (n,) s.
+    channels : values (n,) by name. units : unit by name.
+    """
+
+    time: Array
+    channels: Mapping[str, Array]
+    units: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a picture of a run needs.
+
+    Attributes
+    ----------
+    time : (f,) s.
+    names : names of the ellipsoids. semi_axes : (n, 3) m.
+    centre : (f, n, 3) m. orientation : (f, n, 4) quaternions (w, x, y, z).
+    car : (f, 3) x, y (m) and yaw (rad) of the car's frame.
+    outline : list of (k, 2) lines x, z (m) of the car's side view in its frame.
+    plan : (k, 2) x, y (m), outline of the car from above in its frame.
+    """
+
+    time: Array
+    names: Sequence[str]
+    semi_axes: Array
+    centre: Array
+    orientation: Array
+    car: Array
+    outline: Sequence[Array]
+    plan: Array
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run: inputs, status, why it ended, outputs, histories and scene."""
+
+    inputs: Mapping[str, float]
+    status: str
+    end_reason: str
+    outputs: Mapping[str, float]
+    histories: Mapping[str, History] = field(default_factory=dict)
+    scene: Scene | None = None
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Outputs of a batch.
+
+    Attributes
+    ----------
+    outputs : (n, outputs) in the model's order, NaN where an output has no value.
+    status : n strings, ``ok`` or the reason.
+    """
+
+    outputs: Array
+    status: list[str]
+
+
+class Model(Protocol):
+    """A crash model."""
+
+    @property
+    def name(self) -> str:
+        """Name under which it is registered."""
+
+    @property
+    def version(self) -> str:
+        """Changes whenever the numbers may change."""
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """Inputs in order."""
+
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """Outputs in order."""
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects that it can switch on."""
+
+    @property
+    def partial_status(self) -> frozenset[str]:
+        """Statuses of complete runs in which some outputs have no value."""
+
+    def run(self, inputs: Mapping[str, float]) -> Run:
+        """Run once, with time histories; inputs left out take their nominal values."""
+
+    def run_batch(self, rows: Array) -> Batch:
+        """Run (n, inputs) rows."""
+
+
+def complete_inputs(model: Model, given: Mapping[str, float]) -> dict[str, float]:
+    """Return all inputs by name, nominal where not given.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown or a value lies outside its range; the message names both.
+    """
+    known = {item.name: item for item in model.inputs}
+    unknown = sorted(set(given) - set(known))
+    if unknown:
+        raise ValueError(
+            f"model {model.name!r} has no input {unknown[0]!r}; it has {', '.join(known)}"
+        )
+    values = {name: float(given.get(name, item.nominal)) for name, item in known.items()}
+    for name, value in values.items():
+        item = known[name]
+        if not item.low <= value <= item.high:
+            raise ValueError(
+                f"input {name!r} = {value:g} {item.unit} is outside the valid range "
+                f"{item.low:g} to {item.high:g} {item.unit} of model {model.name!r}"
+            )
+    return values

@@ -1,0 +1,37 @@
+"""The models by name: a new model is one module and one line here."""
+
+from collections.abc import Callable, Mapping
+from importlib import import_module
+
+from models.protocol import Model
+
+# name: module and factory, imported only when asked for.
+_MODELS = {
+    "multibody": ("models.multibody.model", "MultibodyModel"),
+}
+
+
+def model_names() -> tuple[str, ...]:
+    """Return the names of all models."""
+    return tuple(_MODELS)
+
+
+def load_model(name: str, options: Mapping[str, str] | None = None) -> Model:
+    """Return a model.
+
+    Parameters
+    ----------
+    name : str
+    options : mapping, optional
+        Choices that are not inputs, such as ``vehicle``.
+
+    Raises
+    ------
+    ValueError
+        If the model or an option is unknown.
+    """
+    if name not in _MODELS:
+        raise ValueError(f"unknown model {name!r}: choose one of {', '.join(_MODELS)}")
+    module, factory = _MODELS[name]
+    build: Callable[..., Model] = getattr(import_module(module), factory)
+    return build(**dict(options or {}))

@@ -1,0 +1,1 @@
+"""The car: front profile, stiffness corridors and prescribed motion."""

@@ -1,0 +1,64 @@
+"""Prescribed motion of the car: braking on an arc until it stops.
+
+A point of the car's axis (``rotation_centre`` behind the front, near the centre of gravity) moves
+on a circle whose radius is the impact speed over the yaw rate, the curvature of the skid marks;
+the car's axis stays tangent to it, so the yaw rate falls with the speed.
+"""
+
+import math
+from typing import NamedTuple
+
+from models.compilation import inlined_kernel
+from models.criteria.units import STANDARD_GRAVITY
+
+
+class CarMotion(NamedTuple):
+    """Parameters: impact speed (m/s), deceleration (m/s2), curvature (1/m), pivot distance (m)."""
+
+    speed: float
+    deceleration: float
+    curvature: float
+    pivot: float
+
+
+def braking_motion(
+    impact_speed: float, friction_tyre_road: float, yaw_rate: float, rotation_centre: float
+) -> CarMotion:
+    """Return the motion of a car that brakes with all wheels at the friction limit.
+
+    Parameters
+    ----------
+    impact_speed : m/s. friction_tyre_road : 1. yaw_rate : rad/s at impact, positive to the left.
+    rotation_centre : m behind the front.
+    """
+    curvature = yaw_rate / impact_speed if impact_speed > 0.0 else 0.0
+    return CarMotion(
+        impact_speed, friction_tyre_road * STANDARD_GRAVITY, curvature, rotation_centre
+    )
+
+
+def stopping_distance(motion: CarMotion) -> float:
+    """Return the path (m) from impact to standstill."""
+    return motion.speed**2 / (2.0 * motion.deceleration)
+
+
+@inlined_kernel
+def car_state(motion, time, car):  # type: ignore[no-untyped-def]
+    """Write origin x, y (m), yaw (rad), their rates (m/s, m/s, rad/s) into ``car`` (6,)."""
+    stop = motion.speed / motion.deceleration
+    t = min(time, stop)
+    speed = motion.speed - motion.deceleration * t
+    path = motion.speed * t - 0.5 * motion.deceleration * t * t
+    yaw = motion.curvature * path
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    if abs(yaw) > 1e-6:
+        x, y = sine / motion.curvature, (1.0 - cosine) / motion.curvature
+    else:
+        x, y = path, 0.5 * path * yaw
+    rate = motion.curvature * speed
+    car[0] = x - motion.pivot + motion.pivot * cosine
+    car[1] = y + motion.pivot * sine
+    car[2] = yaw
+    car[3] = speed * cosine - rate * motion.pivot * sine
+    car[4] = speed * sine + rate * motion.pivot * cosine
+    car[5] = rate

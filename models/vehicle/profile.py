@@ -1,0 +1,281 @@
+"""Front profile of a car, its stiffness corridors and its wrap-around line."""
+
+import functools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models import data
+from models.contact.law import ForceCurve
+from models.multibody.surfaces import MAXIMUM_DEPTH, PANEL, ROLL, Zones
+
+Array = NDArray[np.float64]
+
+EDGE_TANGENT = math.radians(40.0)
+"""Slope of the straight edge that marks the hood's leading edge: 50 deg from the vertical
+(EEVC WG17 bonnet leading edge reference line, recalled)."""
+
+
+@dataclass(frozen=True)
+class Corridor:
+    """Lower, median and upper loading curve of a zone."""
+
+    lower: ForceCurve
+    median: ForceCurve
+    upper: ForceCurve
+
+    def curve(self, coordinate: float) -> ForceCurve:
+        """Return the curve at a coordinate: 0 lower, 0.5 median, 1 upper.
+
+        Forces at equal penetration are interpolated linearly, so the curve rises wherever the
+        bounds do.
+
+        Raises
+        ------
+        ValueError
+            If the coordinate is not within 0 to 1.
+        """
+        if not 0.0 <= coordinate <= 1.0:
+            raise ValueError(f"a corridor coordinate lies within 0 and 1, given {coordinate}")
+        share = abs(2.0 * coordinate - 1.0)
+        bound = self.lower if coordinate < 0.5 else self.upper
+        knots = np.union1d(self.median.penetration, bound.penetration)
+        force = (1.0 - share) * self.median.at(knots) + share * bound.at(knots)
+        return _thin(knots, force, self.median)
+
+
+def _thin(penetration: Array, force: Array, like: ForceCurve) -> ForceCurve:
+    """Return a curve of at most five knots, dropping those that bend it least."""
+    while penetration.size > 5:
+        middle = np.interp(penetration[1:-1], penetration[:-2], force[:-2])
+        for k in range(1, penetration.size - 1):
+            a, b = k - 1, k + 1
+            share = (penetration[k] - penetration[a]) / (penetration[b] - penetration[a])
+            middle[k - 1] = (1.0 - share) * force[a] + share * force[b]
+        drop = 1 + int(np.argmin(np.abs(force[1:-1] - middle)))
+        penetration, force = np.delete(penetration, drop), np.delete(force, drop)
+    return ForceCurve(penetration, force, like.unloading_ratio, like.damping)
+
+
+@dataclass(frozen=True)
+class Zone:
+    """One zone of the static front; lengths in m, angles in rad. See ``Zones``."""
+
+    name: str
+    kind: int
+    coordinate: str
+    origin: Array
+    radius: float
+    direction: Array
+    length: float
+    arc: Array
+    half_width: float
+    curvature: float
+    corridor: Corridor
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """A car front from a data file.
+
+    Attributes
+    ----------
+    name, title, source : identification.
+    dive_pivot, rotation_centre : m behind the foremost point.
+    zones : tuple of Zone, from the ground up.
+    """
+
+    name: str
+    title: str
+    source: str
+    dive_pivot: float
+    rotation_centre: float
+    zones: tuple[Zone, ...]
+
+    def zone_index(self, name: str) -> int:
+        """Return the row of a zone; -1 if the car has none of that name."""
+        for j, zone in enumerate(self.zones):
+            if zone.name == name:
+                return j
+        return -1
+
+
+def vehicle_names() -> tuple[str, ...]:
+    """Return the names of the vehicles in the data folder."""
+    return data.names("vehicles")
+
+
+@functools.cache
+def load_vehicle(name: str) -> Vehicle:
+    """Return a vehicle of the data folder.
+
+    Raises
+    ------
+    ValueError
+        If there is none of that name.
+    """
+    if name not in vehicle_names():
+        raise ValueError(f"no vehicle {name!r}: choose one of {', '.join(vehicle_names())}")
+    table = data.load(f"vehicles/{name}.toml")
+    return Vehicle(
+        name=name,
+        title=table["title"],
+        source=table["source"],
+        dive_pivot=table["dive_pivot"],
+        rotation_centre=table["rotation_centre"],
+        zones=tuple(_read_zone(row) for row in table["zones"]),
+    )
+
+
+def _read_zone(row: dict[str, object]) -> Zone:
+    def numbers(key: str) -> Array:
+        return np.array(row[key], dtype=np.float64)
+
+    def curve(key: str) -> ForceCurve:
+        knots = numbers(key)
+        return ForceCurve(
+            knots[:, 0].copy(),
+            knots[:, 1].copy(),
+            float(numbers("unloading_ratio")),
+            float(numbers("damping")),
+        )
+
+    roll = row["kind"] == "roll"
+    origin = numbers("centre" if roll else "start")
+    along = np.array([-1.0, 0.0]) if roll else numbers("end") - origin
+    length = float(np.linalg.norm(along))
+    return Zone(
+        name=str(row["name"]),
+        kind=ROLL if roll else PANEL,
+        coordinate=str(row["coordinate"]),
+        origin=origin,
+        radius=float(numbers("radius")) if roll else 0.0,
+        direction=along / length,
+        length=0.0 if roll else length,
+        arc=np.radians(numbers("arc")) if roll else np.zeros(2),
+        half_width=float(numbers("half_width")),
+        curvature=float(numbers("curvature")),
+        corridor=Corridor(curve("lower"), curve("median"), curve("upper")),
+    )
+
+
+def _turn(points: Array, angle: float) -> Array:
+    """Turn (x, z) vectors nose down by ``angle`` rad."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.stack([c * points[..., 0] + s * points[..., 1],
+                     -s * points[..., 0] + c * points[..., 1]], axis=-1)  # fmt: skip
+
+
+def _dive_shift(vehicle: Vehicle, dive_angle: float) -> Array:
+    """Return the (x, z) shift after the turn about the origin that keeps the front at x = 0."""
+    pivot = np.array([-vehicle.dive_pivot, 0.0])
+    shift = pivot - _turn(pivot, dive_angle)
+    front = max(
+        float(_turn(zone.origin, dive_angle)[0]) + zone.radius
+        for zone in vehicle.zones
+        if zone.kind == ROLL
+    )
+    return np.array([-front, float(shift[1])])
+
+
+def build_zones(
+    vehicle: Vehicle, dive_angle: float, friction_body_car: float, friction_body_road: float
+) -> Zones:
+    """Return the compiled form of the front of a diving car.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    dive_angle : rad, nose down. friction_body_car, friction_body_road : 1.
+    """
+    zones = vehicle.zones
+    shift = _dive_shift(vehicle, dive_angle)
+    friction = np.full(len(zones) + 1, friction_body_car)
+    friction[-1] = friction_body_road
+    origin = np.array([_turn(z.origin, dive_angle) + shift for z in zones])
+    radius = np.array([z.radius for z in zones])
+    direction = np.array([_turn(z.direction, dive_angle) for z in zones])
+    length = np.array([z.length for z in zones])
+    end = origin + length[:, None] * direction
+    sweep = np.array([0.5 * z.curvature * z.half_width**2 for z in zones])
+    depth = np.array([MAXIMUM_DEPTH if z.kind == PANEL else 0.0 for z in zones])
+    low, high = np.minimum(origin, end), np.maximum(origin, end)
+    box = np.stack(
+        [low[:, 0] - radius - sweep, high[:, 0] + radius, low[:, 1] - radius - depth,
+         high[:, 1] + radius], axis=1,
+    )  # fmt: skip
+    return Zones(
+        kind=np.array([z.kind for z in zones]),
+        origin=origin,
+        radius=radius,
+        direction=direction,
+        length=length,
+        arc=np.array([z.arc - dive_angle for z in zones]),
+        half_width=np.array([z.half_width for z in zones]),
+        curvature=np.array([z.curvature for z in zones]),
+        box=box,
+        friction=friction,
+    )
+
+
+def static_point(vehicle: Vehicle, dive_angle: float, point: Array) -> Array:
+    """Return a point (x, z) of the diving car in the frame of the static car."""
+    return _turn(np.asarray(point) - _dive_shift(vehicle, dive_angle), -dive_angle)
+
+
+@functools.cache
+def wrap_around_line(vehicle_name: str) -> Array:
+    """Return the (k, 2) path (x, z) of a tape drawn tight from the road over the static front.
+
+    It starts on the road under the foremost point and follows the upper convex hull of the zones.
+    """
+    vehicle = load_vehicle(vehicle_name)
+    points = []
+    for zone in vehicle.zones:
+        if zone.kind == ROLL:
+            angle = np.linspace(-math.pi / 2.0, math.pi, 541)
+            ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+            points.append(zone.origin + zone.radius * ring)
+        else:
+            points.append(np.array([zone.origin, zone.origin + zone.length * zone.direction]))
+    cloud = np.concatenate(points)
+    start = np.array([cloud[:, 0].max(), 0.0])
+    hull = [start]
+    # Gift wrapping from the road upwards and rearwards.
+    heading = math.pi / 2.0
+    last = cloud[np.argmin(cloud[:, 0])]
+    while not np.array_equal(hull[-1], last):
+        step = cloud - hull[-1]
+        size = np.hypot(step[:, 0], step[:, 1])
+        angle = np.arctan2(step[:, 1], step[:, 0]) % (2.0 * math.pi)
+        angle = np.where((size > 1e-9) & (angle >= heading - 1e-9), angle, np.inf)
+        nearest = np.lexsort((-size, np.round(angle, 9)))[0]
+        if not np.isfinite(angle[nearest]):
+            break
+        heading = float(angle[nearest])
+        hull.append(cloud[nearest])
+    return np.array(hull)
+
+
+def wrap_around_distance(vehicle_name: str, point: Array) -> float:
+    """Return the length (m) along the tight tape to the foot of a static point (x, z)."""
+    line = wrap_around_line(vehicle_name)
+    step = np.diff(line, axis=0)
+    size = np.hypot(step[:, 0], step[:, 1])
+    share = np.clip(np.sum((point - line[:-1]) * step, axis=1) / size**2, 0.0, 1.0)
+    foot = line[:-1] + share[:, None] * step
+    gap = np.hypot(*(point - foot).T)
+    k = int(np.argmin(gap))
+    return float(size[:k].sum() + share[k] * size[k])
+
+
+@functools.cache
+def hood_edge_distance(vehicle_name: str) -> float:
+    """Return the wrap-around distance (m) of the hood's leading edge line."""
+    line = wrap_around_line(vehicle_name)
+    step = np.diff(line, axis=0)
+    slope = np.arctan2(step[:, 1], -step[:, 0])
+    first = int(np.argmax(slope <= EDGE_TANGENT))
+    return float(np.hypot(step[:first, 0], step[:first, 1]).sum())

@@ -36,6 +36,9 @@ SEGMENTS = (
 )
 PARENTS = (-1, 0, 1, 2, 3, 2, 5, 2, 7, 0, 9, 10, 0, 12, 13)
 HEAD = SEGMENTS.index("head")
+HEAD_INERTIA_FACTOR = 1.15
+"""A skull carries its mass further out than a homogeneous ellipsoid: the data sheet allows 15 % more
+for the head [estimated]; adult heads measure 0.020 to 0.024 kg m2 against the ellipsoid's 0.021."""
 TRUNK = tuple(SEGMENTS.index(name) for name in ("hip", "abdomen", "chest"))
 
 
@@ -150,6 +153,7 @@ def build_body(
     axes = between(child.semi_axes, adult.semi_axes) * _axis_scale(stature, body_mass)
     squares = axes**2
     inertia = mass[:, None] / 5.0 * (squares.sum(axis=1, keepdims=True) - squares)
+    inertia[HEAD] *= HEAD_INERTIA_FACTOR
     return Body(
         age=age,
         stature=stature,

@@ -1,0 +1,1 @@
+"""Methods: what one does with any crash model."""

@@ -1,0 +1,210 @@
+"""The command line: one verb a task, the same options and exit codes everywhere.
+
+Exit codes: 0 done, 1 the study failed, 2 the user's input is wrong, 130 interrupted.
+"""
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table as RichTable
+
+from mcstudy.errors import StudyError, UserError
+
+app = typer.Typer(
+    help="Monte Carlo uncertainty and injury-risk studies of crash simulations.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+Study = Annotated[Path, typer.Argument(help="Study file (TOML).", show_default=False)]
+Folder = Annotated[Path, typer.Argument(help="Results folder.", show_default=False)]
+Out = Annotated[
+    Path | None, typer.Option(help="Results folder; by default results/<name of the study>.")
+]
+Workers = Annotated[int, typer.Option(help="Worker processes; -1 for one a core.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Print no progress and no summary.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+
+
+@app.command()
+def run(
+    study: Study, out: Out = None, workers: Workers = -1, quiet: Quiet = False, as_json: Json = False
+) -> None:
+    """Run a study, or go on with it where it stopped, and write its report."""
+    from mcstudy.config import MonteCarloStudy, load_study
+    from studies import monte_carlo, reconstruction
+
+    checked = load_study(study)
+    if not isinstance(checked, MonteCarloStudy):
+        raise UserError(
+            f"{study}: kind {checked.kind!r} is run by 'mcstudy reconstruct', not by 'run'"
+        )
+    folder = reconstruction.default_folder(checked, out)
+    analysis = monte_carlo.run_monte_carlo(
+        checked,
+        monte_carlo.study_text(study),
+        folder,
+        workers=workers,
+        quiet=quiet or as_json,
+    )
+    _print_analysis(analysis, folder.path, quiet=quiet, as_json=as_json)
+
+
+@app.command()
+def reconstruct(
+    study: Study, out: Out = None, quiet: Quiet = False, as_json: Json = False
+) -> None:
+    """Run one case, print it beside published tables and draw it."""
+    from mcstudy.config import Reconstruction, load_study
+    from studies import monte_carlo, reconstruction
+
+    checked = load_study(study)
+    if not isinstance(checked, Reconstruction):
+        raise UserError(f"{study}: kind {checked.kind!r} is run by 'mcstudy run'")
+    case, tables = reconstruction.reconstruct(checked)
+    folder = reconstruction.default_folder(checked, out)
+    reconstruction.write_reconstruction(
+        checked, monte_carlo.study_text(study), case, tables, folder
+    )
+    if as_json:
+        _print_json(dict(case.outputs) | {"status": case.status})
+    elif not quiet:
+        console = Console()
+        for comparison in tables:
+            _print_table(console, reconstruction.as_table(comparison))
+        console.print(f"ended: {case.end_reason.replace('_', ' ')}")
+        console.print(f"report: {folder.path / 'report.html'}", soft_wrap=True)
+
+
+@app.command()
+def report(folder: Folder, quiet: Quiet = False, as_json: Json = False) -> None:
+    """Rebuild analysis, figures and report of a results folder without running the model."""
+    from mcstudy.results import ResultsFolder
+    from studies import monte_carlo
+
+    analysis = monte_carlo.build_report(ResultsFolder(folder))
+    _print_analysis(analysis, folder, quiet=quiet, as_json=as_json)
+
+
+@app.command()
+def status(folder: Folder, as_json: Json = False) -> None:
+    """Tell how far the study of a results folder is."""
+    from mcstudy.results import ResultsFolder
+
+    results = ResultsFolder(folder)
+    manifest = results.read_json("manifest.json")
+    runs = results.done()
+    done = 0 if runs is None else len(runs)
+    counts = {} if runs is None else {str(k): int(v) for k, v in runs["status"].value_counts().items()}
+    total = int(manifest["design"]["n"])
+    if as_json:
+        _print_json({"done": done, "total": total, "counts": counts})
+        return
+    detail = ", ".join(f"{n} {name}" for name, n in counts.items())
+    print(f"{manifest['study']}: {done} of {total} runs done" + (f" ({detail})" if detail else ""))
+
+
+@app.command()
+def models(
+    name: Annotated[str | None, typer.Argument(help="A model, for its inputs and outputs.")] = None,
+    as_json: Json = False,
+) -> None:
+    """List the models, or the inputs and outputs of one."""
+    from models.registry import load_model, model_names
+
+    if name is None:
+        if as_json:
+            _print_json({"models": list(model_names())})
+        else:
+            print("\n".join(model_names()))
+        return
+    try:
+        model = load_model(name)
+    except ValueError as error:
+        raise UserError(str(error)) from None
+    inputs = [
+        {"name": i.name, "unit": i.unit, "nominal": i.nominal, "low": i.low, "high": i.high,
+         "meaning": i.meaning, "source": i.source}
+        for i in model.inputs
+    ]  # fmt: skip
+    outputs = [{"name": o.name, "unit": o.unit, "meaning": o.meaning} for o in model.outputs]
+    if as_json:
+        _print_json({"name": name, "version": model.version, "inputs": inputs, "outputs": outputs})
+        return
+    console = Console()
+    for title, rows in (("inputs", inputs), ("outputs", outputs)):
+        table = RichTable(*rows[0], title=title)
+        for row in rows:
+            table.add_row(*(f"{v:.5g}" if isinstance(v, float) else str(v) for v in row.values()))
+        console.print(table)
+
+
+def _print_analysis(analysis: dict[str, Any], path: Path, *, quiet: bool, as_json: bool) -> None:
+    if as_json:
+        _print_json({"folder": str(path), "analysis": analysis})
+        return
+    if quiet:
+        return
+    from mcstudy.text import interval, number
+
+    console = Console()
+    table = RichTable("output", "unit", "mean (95 % interval)", "5 %", "median", "95 %")
+    for name in analysis["convergence"]:
+        entry = analysis["outputs"][name]
+        if "mean" not in entry:
+            continue
+        q = entry["quantiles"]
+        table.add_row(
+            name,
+            entry["unit"],
+            interval(entry["mean"]),
+            *(number(q[p]["value"]) for p in ("0.05", "0.5", "0.95")),
+        )
+    console.print(table)
+    counts = ", ".join(f"{n} {status}" for status, n in analysis["status"].items())
+    console.print(f"{analysis['runs']} runs: {counts}")
+    console.print(f"report: {path / 'report.html'}", soft_wrap=True)
+
+
+def _print_table(console: Console, table: Any) -> None:
+    shown = RichTable(*table.head, title=table.caption)
+    for row in table.rows:
+        shown.add_row(*row)
+    console.print(shown)
+
+
+def _print_json(content: dict[str, Any]) -> None:
+    from mcstudy.results import to_json
+
+    sys.stdout.write(to_json(content))
+
+
+def main() -> None:
+    """Run the command line and exit."""
+    try:
+        app(standalone_mode=False)
+    except UserError as error:
+        _fail(str(error), 2)
+    except StudyError as error:
+        _fail(str(error), 1)
+    except (KeyboardInterrupt, typer.Abort):
+        _fail("interrupted; what arrived is kept, run the same command again to resume", 130)
+    except Exception as error:
+        # Typer's own complaints (unknown option, missing file) carry an exit code and a message.
+        if hasattr(error, "exit_code") and hasattr(error, "format_message"):
+            _fail(error.format_message(), 2)
+        raise
+    sys.exit(0)
+
+
+def _fail(message: str, code: int) -> None:
+    print(f"mcstudy: {message}", file=sys.stderr)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,189 @@
+"""Pictures of one crash: kinematics strip, histories, animation."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from PIL import Image
+
+from mcstudy.figures import style
+
+Array = NDArray[np.float64]
+
+
+class SceneLike(Protocol):
+    """Poses of ellipsoids and car; see the model protocol."""
+
+    @property
+    def time(self) -> Array: ...
+    @property
+    def names(self) -> Sequence[str]: ...
+    @property
+    def semi_axes(self) -> Array: ...
+    @property
+    def centre(self) -> Array: ...
+    @property
+    def orientation(self) -> Array: ...
+    @property
+    def car(self) -> Array: ...
+    @property
+    def outline(self) -> Sequence[Array]: ...
+    @property
+    def plan(self) -> Array: ...
+
+
+_CIRCLE = np.stack(
+    [np.cos(np.linspace(0.0, 2.0 * np.pi, 41)), np.sin(np.linspace(0.0, 2.0 * np.pi, 41))]
+)
+
+
+def _rotation(q: Array) -> Array:
+    w, x, y, z = q
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _colour(name: str) -> str:
+    if name.endswith("_left"):
+        return style.ORANGE
+    return style.BLUE if name.endswith("_right") else "#B9C6CF"
+
+
+def _shadow(scene: SceneLike, frame: int, segment: int, axes: tuple[int, int]) -> Array:
+    """Return the (41, 2) outline of an ellipsoid's projection on two world axes."""
+    R = _rotation(scene.orientation[frame, segment])
+    shape = R @ np.diag(scene.semi_axes[segment] ** 2) @ R.T
+    pick = np.ix_(axes, axes)
+    values, vectors = np.linalg.eigh(shape[pick])
+    ring = vectors @ (np.sqrt(np.maximum(values, 0.0))[:, None] * _CIRCLE)
+    return ring.T + scene.centre[frame, segment, list(axes)]
+
+
+def _draw_body(
+    axes: Axes, scene: SceneLike, frame: int, plane: tuple[int, int], shift: tuple[float, float]
+) -> None:
+    # Far segments first, so that near ones cover them.
+    depth_axis = ({0, 1, 2} - set(plane)).pop()
+    order = np.argsort(scene.centre[frame, :, depth_axis])
+    if plane == (0, 2):
+        order = order[::-1]
+    shapes = [_shadow(scene, frame, int(i), plane) - shift for i in order]
+    colours = [_colour(scene.names[int(i)]) for i in order]
+    axes.add_collection(
+        PolyCollection(shapes, facecolors=colours, edgecolors="#333333", linewidths=0.6, alpha=0.92)
+    )
+
+
+def _draw_car_side(axes: Axes, scene: SceneLike, x: float) -> None:
+    for line in scene.outline:
+        axes.plot(line[:, 0] + x, line[:, 1], color="#333333", linewidth=1.2)
+
+
+def _draw_car_plan(axes: Axes, scene: SceneLike, frame: int) -> None:
+    x, y, yaw = scene.car[frame]
+    c, s = math.cos(yaw), math.sin(yaw)
+    plan = scene.plan @ np.array([[c, s], [-s, c]]) + (x, y)
+    axes.fill(plan[:, 0], plan[:, 1], facecolor="#EFEFEF", edgecolor="#333333", linewidth=1.2)
+
+
+def draw_strip(scene: SceneLike, times: Sequence[float]) -> Figure:
+    """Return side views at the given times (s) in the car's frame, left limbs orange."""
+    with style.styled():
+        figure = style.new_figure(2.75 * len(times), 3.0)
+        row = figure.subplots(1, len(times), sharey=True, squeeze=False)[0]
+        for axes, time in zip(row, times, strict=True):
+            frame = int(np.argmin(np.abs(scene.time - time)))
+            _draw_car_side(axes, scene, 0.0)
+            _draw_body(axes, scene, frame, (0, 2), (float(scene.car[frame, 0]), 0.0))
+            axes.axhline(0.0, color="#333333", linewidth=0.8)
+            axes.set(xlim=(-1.25, 0.5), ylim=(-0.05, 1.55), aspect="equal")
+            axes.set_title(f"{1e3 * scene.time[frame]:.0f} ms")
+            axes.set_xlabel("x in the car's frame [m]")
+        row[0].set_ylabel("height [m]")
+        figure.suptitle("left limbs orange, right limbs blue", fontsize=9, color=style.GREY)
+        return figure
+
+
+def draw_history(
+    time: Array,
+    channels: Mapping[str, Array],
+    *,
+    ylabel: str,
+    until: float,
+    marks: Mapping[str, float] | None = None,
+) -> Figure:
+    """Return channels against time.
+
+    Parameters
+    ----------
+    time : (n,) s. channels : (n,) values by legend label. ylabel : with unit.
+    until : s, end of the time axis. marks : times (s) of vertical lines by label.
+    """
+    with style.styled():
+        figure = style.new_figure(6.4, 3.6)
+        axes = figure.subplots()
+        shown = time <= until
+        for k, (name, values) in enumerate(channels.items()):
+            axes.plot(1e3 * time[shown], values[shown], label=name, color=style.PALETTE[k])
+        for name, at in (marks or {}).items():
+            if at <= until:
+                axes.axvline(1e3 * at, color=style.GREY, linestyle="--", linewidth=1.0, label=name)
+        axes.set(xlabel="time after first contact [ms]", ylabel=ylabel, xlim=(0.0, 1e3 * until))
+        axes.set_ylim(bottom=0.0)
+        if len(channels) > 1 or marks:
+            axes.legend(framealpha=0.9)
+        return figure
+
+
+def write_animation(scene: SceneLike, path: Path, *, frames: int = 150) -> None:
+    """Write a GIF of the whole crash from the side and from above.
+
+    Time runs slowly at first (the impact) and faster afterwards; the clock is on the picture.
+
+    Parameters
+    ----------
+    scene : SceneLike. path : Path of the GIF. frames : int, at most.
+    """
+    chosen = _animation_frames(scene.time, frames)
+    low = scene.centre[:, :, 0].min() - 0.8
+    high = max(scene.centre[:, :, 0].max(), scene.car[:, 0].max()) + 0.6
+    pictures = []
+    with style.styled():
+        for frame in chosen:
+            figure = style.new_figure(9.6, 4.4)
+            side, above = figure.subplots(2, 1, height_ratios=[1.0, 1.35])
+            _draw_car_side(side, scene, float(scene.car[frame, 0]))
+            _draw_body(side, scene, frame, (0, 2), (0.0, 0.0))
+            side.axhline(0.0, color="#333333", linewidth=0.8)
+            side.set(xlim=(low, high), ylim=(-0.1, 2.6), aspect="equal", ylabel="height [m]")
+            side.set_title(f"t = {1e3 * scene.time[frame]:.0f} ms", loc="left")
+            _draw_car_plan(above, scene, frame)
+            _draw_body(above, scene, frame, (0, 1), (0.0, 0.0))
+            middle = float(scene.centre[:, :, 1].mean())
+            above.set(xlim=(low, high), ylim=(middle - 2.6, middle + 2.6), aspect="equal")
+            above.set(xlabel="x along the road [m]", ylabel="y, left [m]")
+            figure.canvas.draw()
+            image = np.asarray(figure.canvas.buffer_rgba())[..., :3]  # type: ignore[attr-defined]
+            pictures.append(Image.fromarray(image).quantize(64))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pictures[0].save(
+        path, save_all=True, append_images=pictures[1:], duration=60, loop=0, optimize=True
+    )
+
+
+def _animation_frames(time: Array, count: int) -> list[int]:
+    """Return frames spaced evenly over time**0.6, which slows the impact down."""
+    end = float(time[-1])
+    wanted = end * np.linspace(0.0, 1.0, count) ** (1.0 / 0.6)
+    return sorted({int(np.argmin(np.abs(time - t))) for t in wanted})

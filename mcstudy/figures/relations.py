@@ -1,0 +1,134 @@
+"""How outputs go with inputs and with each other."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+import seaborn as sns
+from matplotlib.figure import Figure
+
+from mcstudy.figures import style
+from mcstudy.figures.distributions import Mark
+
+
+def draw_correlations(correlations: pd.DataFrame, noise: float) -> Figure:
+    """Return a heat map of rank correlations, inputs by outputs.
+
+    Parameters
+    ----------
+    correlations : rows inputs, columns outputs. noise : |rho| below which 95 % of unrelated
+        inputs fall; such cells are printed grey.
+    """
+    with style.styled():
+        figure = style.new_figure(1.35 * len(correlations.columns) + 2.6, 0.36 * len(correlations) + 1.6)
+        axes = figure.subplots()
+        named = correlations.rename(index=style.words, columns=style.words)
+        sns.heatmap(
+            named,
+            ax=axes,
+            cmap=sns.diverging_palette(240, 30, s=85, l=50, as_cmap=True),
+            vmin=-1.0,
+            vmax=1.0,
+            linewidths=0.5,
+            annot=True,
+            fmt=".2f",
+            annot_kws={"fontsize": 8},
+            cbar_kws={"label": "Spearman rank correlation [–]"},
+        )
+        for text, value in zip(axes.texts, named.to_numpy().ravel(), strict=True):
+            if abs(value) < noise:
+                text.set_color("#A0A0A0")
+        axes.set(xlabel="", ylabel="")
+        axes.tick_params(axis="x", rotation=35, length=0)
+        axes.tick_params(axis="y", rotation=0, length=0)
+        for tick in axes.get_xticklabels():
+            tick.set_horizontalalignment("right")
+        return figure
+
+
+def draw_against_input(
+    runs: pd.DataFrame,
+    column: str,
+    input_label: str,
+    units: Mapping[str, str],
+    marks: Mapping[str, Sequence[Mark]],
+) -> Figure:
+    """Return each output against one input, with the running median and 90 % band."""
+    with style.styled():
+        figure = style.new_figure(4.4 * len(units), 3.8)
+        row = figure.subplots(1, len(units), squeeze=False)[0]
+        for axes, (name, unit) in zip(row, units.items(), strict=True):
+            part = runs[[column, name]].dropna()
+            axes.scatter(part[column], part[name], s=6, color=style.SKY, alpha=0.45, linewidths=0)
+            _band(axes, part[column].to_numpy(), part[name].to_numpy())
+            for mark in marks.get(name, ()):
+                colour = {"observed": style.RED, "limit": "black"}.get(mark.kind, style.GREEN)
+                axes.axhline(mark.value, color=colour, linewidth=1.3, label=mark.label, linestyle="--")
+            top = float(np.quantile(part[name], 0.998))
+            axes.set_ylim(top=1.25 * top)
+            axes.set(xlabel=input_label, ylabel=style.label(name, unit))
+            axes.legend(loc="upper left", fontsize=8, framealpha=0.9)
+        return figure
+
+
+def _band(axes: object, x: np.ndarray, y: np.ndarray) -> None:
+    edges = np.quantile(x, np.linspace(0.0, 1.0, 13))
+    middle, low, centre, high = [], [], [], []
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        inside = (x >= a) & (x <= b)
+        if inside.sum() >= 10:
+            middle.append(float(np.median(x[inside])))
+            for into, p in ((low, 0.05), (centre, 0.5), (high, 0.95)):
+                into.append(float(np.quantile(y[inside], p)))
+    axes.plot(middle, centre, color=style.BLUE, label="running median")  # type: ignore[attr-defined]
+    axes.fill_between(  # type: ignore[attr-defined]
+        middle, low, high, color=style.BLUE, alpha=0.18, linewidth=0, label="5 to 95 %"
+    )
+
+
+def draw_joint(
+    runs: pd.DataFrame, first: tuple[str, str], second: tuple[str, str], point: Mapping[str, float]
+) -> Figure:
+    """Return two outputs against each other with contours and the accident's own point.
+
+    Parameters
+    ----------
+    runs : table. first, second : name and unit. point : the accident's values, may be empty.
+    """
+    with style.styled():
+        figure = style.new_figure(5.4, 4.4)
+        axes = figure.subplots()
+        part = runs[[first[0], second[0]]].dropna()
+        axes.scatter(
+            part[first[0]], part[second[0]], s=7, color=style.SKY, alpha=0.5, linewidths=0, label="runs"
+        )
+        if len(part) > 50:
+            sns.kdeplot(
+                data=part, x=first[0], y=second[0], ax=axes, levels=[0.1, 0.5], color=style.BLUE,
+                linewidths=1.3,
+            )  # fmt: skip
+            axes.plot([], [], color=style.BLUE, label="50 % and 90 % of the runs inside")
+        if first[0] in point and second[0] in point:
+            axes.scatter(
+                point[first[0]], point[second[0]], marker="X", s=110, color=style.RED,
+                edgecolors="white", label="accident", zorder=5,
+            )  # fmt: skip
+        axes.set(xlabel=style.label(*first), ylabel=style.label(*second))
+        axes.set_ylim(top=part[second[0]].max() + 0.22 * np.ptp(part[second[0]]))
+        axes.legend(loc="upper left", fontsize=8, framealpha=0.9)
+        return figure
+
+
+def draw_convergence(tables: Mapping[str, Sequence[Mapping[str, float]]], units: Mapping[str, str]) -> Figure:
+    """Return the medians over growing parts of the study."""
+    with style.styled():
+        figure = style.new_figure(4.4 * len(tables), 2.9)
+        row = figure.subplots(1, len(tables), squeeze=False)[0]
+        for axes, (name, table) in zip(row, tables.items(), strict=True):
+            n = [entry["n"] for entry in table]
+            axes.plot(n, [entry["value"] for entry in table], "o-", color=style.BLUE)
+            axes.set_xscale("log", base=2)
+            axes.set_xticks(n, [f"{int(k)}" for k in n])
+            axes.minorticks_off()
+            axes.set(xlabel="runs [–]", ylabel="median " + style.label(name, units[name]))
+        return figure

@@ -1,0 +1,249 @@
+"""Distributions of inputs and their dependence.
+
+Every distribution is a table of a study file and knows one thing: its quantile function. A design
+gives independent uniforms; a Gaussian copula makes them dependent; the quantiles turn them into
+values in the file's unit, converted to the model's unit by the caller.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, PositiveFloat, model_validator
+from scipy import special, stats
+
+Array = NDArray[np.float64]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class _Distribution(_Table):
+    unit: str = "1"
+
+    @property
+    def parents(self) -> tuple[str, ...]:
+        """Inputs on whose value the distribution depends."""
+        return ()
+
+
+
+class Uniform(_Distribution):
+    """Equally probable between ``low`` and ``high``."""
+
+    distribution: Literal["uniform"]
+    low: FiniteFloat
+    high: FiniteFloat
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "Uniform":
+        if not self.low < self.high:
+            raise ValueError(f"low ({self.low:g}) must be below high ({self.high:g})")
+        return self
+
+    def quantile(self, u: Array, given: Mapping[str, Array]) -> Array:
+        """Return the values at probabilities ``u``."""
+        return self.low + (self.high - self.low) * u
+
+
+class Triangular(_Distribution):
+    """Triangle from ``low`` over ``mode`` to ``high``."""
+
+    distribution: Literal["triangular"]
+    low: FiniteFloat
+    mode: FiniteFloat
+    high: FiniteFloat
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "Triangular":
+        if not (self.low <= self.mode <= self.high and self.low < self.high):
+            raise ValueError("low, mode and high must rise")
+        return self
+
+    def quantile(self, u: Array, given: Mapping[str, Array]) -> Array:
+        """Return the values at probabilities ``u``."""
+        width = self.high - self.low
+        shape = (self.mode - self.low) / width
+        return np.asarray(stats.triang.ppf(u, shape, loc=self.low, scale=width))
+
+
+class _Truncated(_Distribution):
+    low: FiniteFloat | None = None
+    high: FiniteFloat | None = None
+
+    @model_validator(mode="after")
+    def _bounds(self) -> "_Truncated":
+        if self.low is not None and self.high is not None and not self.low < self.high:
+            raise ValueError(f"low ({self.low:g}) must be below high ({self.high:g})")
+        if self.high is not None and self._cumulative(self.high) <= 0.0:
+            raise ValueError(f"no probability is left below high ({self.high:g})")
+        if self.low is not None and self._cumulative(self.low) >= 1.0:
+            raise ValueError(f"no probability is left above low ({self.low:g})")
+        return self
+
+    def _cumulative(self, value: float) -> float:
+        raise NotImplementedError
+
+    def _truncate(self, u: Array) -> Array:
+        """Return the probabilities of the untruncated distribution."""
+        low = 0.0 if self.low is None else self._cumulative(self.low)
+        high = 1.0 if self.high is None else self._cumulative(self.high)
+        return low + (high - low) * u
+
+
+class Normal(_Truncated):
+    """Normal, truncated where ``low`` or ``high`` is given."""
+
+    distribution: Literal["normal"]
+    mean: FiniteFloat
+    sd: PositiveFloat
+
+    def _cumulative(self, value: float) -> float:
+        return float(special.ndtr((value - self.mean) / self.sd))
+
+    def quantile(self, u: Array, given: Mapping[str, Array]) -> Array:
+        """Return the values at probabilities ``u``."""
+        return np.asarray(self.mean + self.sd * special.ndtri(self._truncate(u)))
+
+
+class LogNormal(_Truncated):
+    """Log-normal by its median and the standard deviation of the logarithm."""
+
+    distribution: Literal["lognormal"]
+    median: PositiveFloat
+    sigma: PositiveFloat
+
+    def _cumulative(self, value: float) -> float:
+        if value <= 0.0:
+            return 0.0
+        return float(special.ndtr(np.log(value / self.median) / self.sigma))
+
+    def quantile(self, u: Array, given: Mapping[str, Array]) -> Array:
+        """Return the values at probabilities ``u``."""
+        return np.asarray(self.median * np.exp(self.sigma * special.ndtri(self._truncate(u))))
+
+
+class GrowthChart(_Distribution):
+    """LMS distribution of a body measure given age: ``M (1 + L S z)^(1/L)``.
+
+    ``age`` names the input that holds the age; ``at`` lists ages (in that input's unit in the
+    file) and ``L``, ``M``, ``S`` the parameters there, interpolated linearly between.
+    """
+
+    distribution: Literal["growth-chart"]
+    age: str
+    at: Annotated[list[FiniteFloat], Field(min_length=2)]
+    L: list[FiniteFloat]
+    M: list[PositiveFloat]
+    S: list[PositiveFloat]
+
+    @model_validator(mode="after")
+    def _lengths(self) -> "GrowthChart":
+        if not len(self.at) == len(self.L) == len(self.M) == len(self.S):
+            raise ValueError("at, L, M and S must be of equal length")
+        if np.any(np.diff(self.at) <= 0.0):
+            raise ValueError("at must rise")
+        return self
+
+    @property
+    def parents(self) -> tuple[str, ...]:
+        """The age input."""
+        return (self.age,)
+
+    def quantile(self, u: Array, given: Mapping[str, Array]) -> Array:
+        """Return the values at probabilities ``u`` and the ages ``given``."""
+        age = given[self.age]
+        L, M, S = (np.interp(age, self.at, p) for p in (self.L, self.M, self.S))
+        z = special.ndtri(u)
+        inside = 1.0 + L * S * z
+        with np.errstate(invalid="ignore", divide="ignore"):
+            power = np.where(np.abs(L) > 1e-9, inside ** (1.0 / L), np.exp(S * z))
+        return np.asarray(M * power)
+
+
+Distribution = Annotated[
+    Uniform | Triangular | Normal | LogNormal | GrowthChart, Field(discriminator="distribution")
+]
+
+
+def sampling_order(distributions: Mapping[str, Distribution]) -> list[str]:
+    """Return the inputs so that each comes after those it depends on.
+
+    Raises
+    ------
+    ValueError
+        If an input depends on one that is not sampled, or on itself.
+    """
+    order: list[str] = []
+    waiting = dict(distributions)
+    while waiting:
+        ready = [n for n, d in waiting.items() if all(p in order for p in d.parents)]
+        if not ready:
+            name, distribution = next(iter(waiting.items()))
+            raise ValueError(
+                f"inputs.{name} depends on {', '.join(distribution.parents)}, "
+                "which must be sampled too and not depend on it"
+            )
+        order += ready
+        for name in ready:
+            del waiting[name]
+    return order
+
+
+def copula_factor(names: Sequence[str], correlations: Sequence[tuple[str, str, float]]) -> Array:
+    """Return the Cholesky factor (d, d) of a Gaussian copula.
+
+    Parameters
+    ----------
+    names : d sampled inputs.
+    correlations : triples of two names and the correlation of their normal scores.
+
+    Raises
+    ------
+    ValueError
+        If a name is not sampled, a pair is repeated, or the matrix is not positive definite.
+    """
+    matrix = np.eye(len(names))
+    seen = set()
+    for first, second, value in correlations:
+        for name in (first, second):
+            if name not in names:
+                raise ValueError(f"{name!r} is not a sampled input")
+        pair = frozenset((first, second))
+        if len(pair) == 1 or pair in seen:
+            raise ValueError(f"the pair {first!r}, {second!r} is repeated or of one input")
+        if not -1.0 < value < 1.0:
+            raise ValueError(f"correlation {value:g} of {first!r}, {second!r} is not within -1 and 1")
+        seen.add(pair)
+        i, j = names.index(first), names.index(second)
+        matrix[i, j] = matrix[j, i] = value
+    try:
+        return np.asarray(np.linalg.cholesky(matrix))
+    except np.linalg.LinAlgError:
+        raise ValueError("the correlations contradict each other (not positive definite)") from None
+
+
+def sample_values(
+    uniforms: Array, distributions: Mapping[str, Distribution], factor: Array
+) -> dict[str, Array]:
+    """Return values in the file's units for independent uniforms.
+
+    Parameters
+    ----------
+    uniforms : (n, d) in (0, 1), columns in the order of ``distributions``.
+    distributions : d inputs by name.
+    factor : (d, d) from ``copula_factor``.
+    """
+    scores = special.ndtri(np.clip(uniforms, 1e-15, 1.0 - 1e-15))
+    dependent = special.ndtr(scores @ factor.T)
+    # Where nothing is correlated keep the uniforms to the last bit.
+    columns = {
+        name: uniforms[:, k] if np.count_nonzero(factor[k]) == 1 else dependent[:, k]
+        for k, name in enumerate(distributions)
+    }
+    values: dict[str, Array] = {}
+    for name in sampling_order(distributions):
+        values[name] = distributions[name].quantile(columns[name], values)
+    return values

@@ -1,0 +1,58 @@
+"""A report as data, rendered to one HTML file that opens without a network."""
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+
+from jinja2 import Environment
+from matplotlib.figure import Figure
+
+from mcstudy.figures.style import png_bytes
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table: caption, head, rows of ready text."""
+
+    caption: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section: heading, paragraphs, tables, figures and GIF files by caption."""
+
+    heading: str
+    paragraphs: Sequence[str] = ()
+    tables: Sequence[Table] = ()
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+    animations: Mapping[str, bytes] = field(default_factory=dict)
+
+
+def render(title: str, subtitle: str, sections: Sequence[Section]) -> str:
+    """Return the HTML of a report; all text is escaped."""
+    source = files("mcstudy.report").joinpath("template.html").read_text(encoding="utf-8")
+    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    shown = [
+        {
+            "heading": section.heading,
+            "paragraphs": section.paragraphs,
+            "tables": section.tables,
+            "images": [
+                (caption, "image/png", _encode(png_bytes(figure)))
+                for caption, figure in section.figures.items()
+            ]
+            + [
+                (caption, "image/gif", _encode(data))
+                for caption, data in section.animations.items()
+            ],
+        }
+        for section in sections
+    ]
+    return environment.from_string(source).render(title=title, subtitle=subtitle, sections=shown)
+
+
+def _encode(data: bytes) -> str:
+    return base64.b64encode(data).decode()

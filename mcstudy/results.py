@@ -1,0 +1,229 @@
+"""The results folder of a study: what is written where, and how it is read back.
+
+::
+
+    study.toml      the file as run
+    manifest.json   versions, seed, model, machine, wall time, counts, digest
+    parts/          chunks as they arrive, gone once compacted
+    runs.parquet    one row a run: run id, replicate, every input, every output, status
+    histories/      time histories of chosen runs
+    analysis.json   every number that the report prints
+    figures/        PNG and SVG
+    report.html     self-contained
+"""
+
+import contextlib
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from mcstudy.errors import StudyError, UserError
+
+RUNS = "runs.parquet"
+
+
+class ResultsFolder:
+    """A results folder.
+
+    Parameters
+    ----------
+    path : Path
+        The folder; created by ``open_for_writing`` only.
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        self.path = Path(path)
+
+    # -- writing ---------------------------------------------------------------------------
+
+    @contextlib.contextmanager
+    def open_for_writing(self) -> Iterator[None]:
+        """Create the folder and hold its lock.
+
+        Raises
+        ------
+        UserError
+            If another process writes into the folder, or it cannot be created.
+        """
+        import fcntl
+
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            handle = (self.path / ".lock").open("w")
+        except OSError as error:
+            raise UserError(f"{self.path}: cannot be written ({error})") from None
+        with handle:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise UserError(
+                    f"{self.path}: another run writes into this folder; wait or choose --out"
+                ) from None
+            yield
+
+    def write_text(self, name: str, text: str) -> None:
+        """Write a text file at once: a reader sees the old one or the new one."""
+        target = self.path / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary = target.with_name(f".{target.name}.tmp")
+        temporary.write_text(text, encoding="utf-8")
+        os.replace(temporary, target)
+
+    def write_json(self, name: str, content: Any) -> None:
+        """Write a JSON file at once; NaN becomes null."""
+        self.write_text(name, to_json(content))
+
+    def write_frame(self, name: str, frame: pd.DataFrame) -> None:
+        """Write a Parquet file at once."""
+        target = self.path / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary = target.with_name(f".{target.name}.tmp")
+        pq.write_table(pa.Table.from_pandas(frame, preserve_index=False), temporary)
+        os.replace(temporary, target)
+
+    def add_part(self, frame: pd.DataFrame) -> None:
+        """Keep a chunk of runs."""
+        first = int(frame["run"].iloc[0])
+        self.write_frame(f"parts/part-{first:09d}-{len(frame):06d}.parquet", frame)
+
+    def compact(self, frame: pd.DataFrame) -> None:
+        """Write ``runs.parquet`` and drop the parts."""
+        self.write_frame(RUNS, frame)
+        for part in self._parts():
+            part.unlink()
+        with contextlib.suppress(OSError):
+            (self.path / "parts").rmdir()
+
+    # -- reading ---------------------------------------------------------------------------
+
+    def _parts(self) -> list[Path]:
+        return sorted((self.path / "parts").glob("part-*.parquet"))
+
+    def done(self) -> pd.DataFrame | None:
+        """Return all runs on disk, sorted by run id, or None if there are none."""
+        files = [self.path / RUNS] if (self.path / RUNS).exists() else []
+        frames = []
+        for file in files + self._parts():
+            try:
+                frames.append(pq.read_table(file).to_pandas())
+            except (OSError, pa.ArrowInvalid):
+                # A torn file is run again.
+                file.rename(file.with_suffix(".broken"))
+        if not frames:
+            return None
+        runs = pd.concat(frames, ignore_index=True).drop_duplicates("run")
+        return runs.sort_values("run", ignore_index=True)
+
+    def runs(self) -> pd.DataFrame:
+        """Return the table of runs.
+
+        Raises
+        ------
+        UserError
+            If the folder holds no runs.
+        """
+        found = self.done()
+        if found is None:
+            raise UserError(f"{self.path}: holds no runs; run the study first")
+        return found
+
+    def read_json(self, name: str) -> dict[str, Any]:
+        """Return a JSON file of the folder.
+
+        Raises
+        ------
+        UserError
+            If it is missing or not JSON.
+        """
+        try:
+            content = json.loads((self.path / name).read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise UserError(f"{self.path / name}: cannot be read ({error})") from None
+        if not isinstance(content, dict):
+            raise UserError(f"{self.path / name}: is not a JSON object")
+        return content
+
+    def history(self, run: int) -> dict[str, pd.DataFrame]:
+        """Return the kept time histories of a run: a frame with a ``time`` column by group.
+
+        Raises
+        ------
+        UserError
+            If the run's histories were not kept.
+        """
+        folder = self.path / "histories" / f"run-{run:06d}"
+        files = sorted(folder.glob("*.parquet"))
+        if not files:
+            raise UserError(f"{folder}: no histories were kept for run {run}")
+        return {file.stem: pq.read_table(file).to_pandas() for file in files}
+
+    def check_same_study(self, topics: Mapping[str, str]) -> None:
+        """Raise if the folder holds runs of a study that gives other numbers.
+
+        Raises
+        ------
+        UserError
+            Naming what differs.
+        """
+        if not (self.path / "manifest.json").exists():
+            return
+        held = self.read_json("manifest.json").get("numbers", {})
+        differing = sorted(k for k in {*held, *topics} if held.get(k) != topics.get(k))
+        if differing:
+            raise UserError(
+                f"{self.path}: holds another study (it differs in {', '.join(differing[:4])}); "
+                "choose another --out or remove the folder"
+            )
+
+
+def to_json(content: Any) -> str:
+    """Return JSON text; NumPy values become plain ones, NaN and infinity null."""
+    return json.dumps(_plain(content), indent=2, allow_nan=False) + "\n"
+
+
+def digest(frame: pd.DataFrame) -> str:
+    """Return a digest of the numbers of a table of runs, independent of how they were run."""
+    ordered = frame.sort_values("run")
+    total = hashlib.sha256()
+    for name in ordered.columns:
+        column = ordered[name]
+        total.update(name.encode())
+        if column.dtype.kind in "fiu":
+            total.update(np.ascontiguousarray(column.to_numpy()).tobytes())
+        else:
+            total.update("\n".join(column.astype(str)).encode())
+    return total.hexdigest()
+
+
+def check_failures(counts: Mapping[str, int], failed: set[str], limit: float) -> None:
+    """Raise ``StudyError`` if the share of failed runs exceeds the study's limit."""
+    total = sum(counts.values())
+    lost = {status: n for status, n in counts.items() if status in failed}
+    share = sum(lost.values()) / total if total else 0.0
+    if share > limit:
+        detail = ", ".join(f"{n} {status}" for status, n in sorted(lost.items()))
+        raise StudyError(
+            f"{share:.1%} of the runs failed ({detail}), above max_failure_rate = {limit:.1%}"
+        )
+
+
+def _plain(content: Any) -> Any:
+    if isinstance(content, Mapping):
+        return {str(key): _plain(value) for key, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [_plain(value) for value in content]
+    if isinstance(content, np.ndarray):
+        return _plain(content.tolist())
+    if isinstance(content, np.generic):
+        return _plain(content.item())
+    if isinstance(content, float) and not np.isfinite(content):
+        return None
+    return content

@@ -1,0 +1,14 @@
+"""Random streams that are a pure function of the study's seed and an index.
+
+No stream is ever spawned from another, so a resumed or extended study draws the same numbers.
+"""
+
+import numpy as np
+
+DESIGN = 0
+BOOTSTRAP = 1
+
+
+def generator(seed: int, stream: int, index: int = 0) -> np.random.Generator:
+    """Return the generator of item ``index`` of a named stream."""
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(stream, index)))

@@ -1,0 +1,138 @@
+"""Honest numbers of a sample: estimates with the intervals that its design allows.
+
+Independent samples get order-statistic intervals for quantiles and Wilson intervals for
+probabilities. Latin hypercube and Sobol' samples are not independent; their intervals come from the
+spread of the estimate between independent replicates (Student's t).
+"""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+Array = NDArray[np.float64]
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value with its confidence interval; ``low`` and ``high`` are NaN where none exists."""
+
+    value: float
+    low: float
+    high: float
+
+    def as_dict(self) -> dict[str, float]:
+        """Return the three numbers by name."""
+        return asdict(self)
+
+
+def mean(values: Array, replicate: NDArray[np.int64] | None = None) -> Estimate:
+    """Return the mean with a t interval.
+
+    Parameters
+    ----------
+    values : (n,) finite. replicate : (n,) or None if the samples are independent.
+    """
+    if replicate is not None:
+        return _between(values, replicate, lambda part: float(part.mean()))
+    return _t_interval(values, float(values.mean()))
+
+
+def standard_deviation(values: Array, replicate: NDArray[np.int64] | None = None) -> Estimate:
+    """Return the standard deviation; its interval for independent samples is the bootstrap-free
+    large-sample one, from the variance of the squared deviations.
+    """
+    value = float(values.std(ddof=1)) if values.size > 1 else np.nan
+    if replicate is not None:
+        return _between(values, replicate, lambda part: float(part.std(ddof=1)), value)
+    if values.size < 3 or value == 0.0:
+        return Estimate(value, np.nan, np.nan)
+    squared = (values - values.mean()) ** 2
+    error = float(squared.std(ddof=1)) / (2.0 * value * np.sqrt(values.size))
+    reach = float(stats.norm.ppf(0.5 + CONFIDENCE / 2.0)) * error
+    return Estimate(value, value - reach, value + reach)
+
+
+def quantile(
+    values: Array, probability: float, replicate: NDArray[np.int64] | None = None
+) -> Estimate:
+    """Return a quantile with an order-statistic or between-replicate interval."""
+    value = float(np.quantile(values, probability))
+    if replicate is not None:
+        return _between(values, replicate, lambda p: float(np.quantile(p, probability)), value)
+    n = values.size
+    tail = (1.0 - CONFIDENCE) / 2.0
+    low = int(stats.binom.ppf(tail, n, probability)) - 1
+    high = int(stats.binom.ppf(1.0 - tail, n, probability))
+    ordered = np.sort(values)
+    return Estimate(
+        value,
+        float(ordered[low]) if low >= 0 else np.nan,
+        float(ordered[high]) if high < n else np.nan,
+    )
+
+
+def probability(hits: NDArray[np.bool_], replicate: NDArray[np.int64] | None = None) -> Estimate:
+    """Return the share of hits with a Wilson or between-replicate interval.
+
+    The between-replicate interval is widened to the Wilson one where all replicates agree, as they
+    do for rare events.
+    """
+    n, k = hits.size, int(hits.sum())
+    test = stats.binomtest(k, n).proportion_ci(CONFIDENCE, method="wilson")
+    wilson = Estimate(k / n, float(test.low), float(test.high))
+    if replicate is None:
+        return wilson
+    found = _between(hits.astype(np.float64), replicate, lambda part: float(part.mean()), k / n)
+    if not np.isfinite(found.low) or found.high - found.low == 0.0:
+        return wilson
+    return Estimate(found.value, max(found.low, 0.0), min(found.high, 1.0))
+
+
+def describe(values: Array, replicate: NDArray[np.int64] | None = None) -> dict[str, object]:
+    """Return mean, standard deviation and quantiles of the finite values, with intervals."""
+    finite = np.isfinite(values)
+    part = values[finite]
+    groups = None if replicate is None else replicate[finite]
+    if part.size < 2:
+        return {"n": int(part.size), "undefined": int((~finite).sum())}
+    return {
+        "n": int(part.size),
+        "undefined": int((~finite).sum()),
+        "mean": mean(part, groups).as_dict(),
+        "sd": standard_deviation(part, groups).as_dict(),
+        "quantiles": {
+            f"{p:g}": quantile(part, p, groups).as_dict() for p in (0.05, 0.25, 0.5, 0.75, 0.95)
+        },
+    }
+
+
+def convergence(values: Array, estimator: Callable[[Array], float]) -> list[dict[str, float]]:
+    """Return the estimator on the first n/8, n/4, n/2 and n values."""
+    finite = values[np.isfinite(values)]
+    sizes = [finite.size // k for k in (8, 4, 2, 1)]
+    return [{"n": size, "value": estimator(finite[:size])} for size in sizes if size >= 8]
+
+
+def _between(
+    values: Array,
+    replicate: NDArray[np.int64],
+    estimator: Callable[[Array], float],
+    pooled: float | None = None,
+) -> Estimate:
+    parts = [values[replicate == r] for r in np.unique(replicate)]
+    estimates = np.array([estimator(part) for part in parts if part.size > 1])
+    value = float(estimates.mean()) if pooled is None else pooled
+    return _t_interval(estimates, value)
+
+
+def _t_interval(values: Array, centre: float) -> Estimate:
+    if values.size < 2:
+        return Estimate(centre, np.nan, np.nan)
+    error = float(values.std(ddof=1)) / np.sqrt(values.size)
+    reach = float(stats.t.ppf(0.5 + CONFIDENCE / 2.0, values.size - 1)) * error
+    return Estimate(centre, centre - reach, centre + reach)

@@ -1,0 +1,44 @@
+"""Numbers as people write them."""
+
+import math
+from collections.abc import Mapping
+
+_UNITS = {"1": "", "m/s2": "m/s²", "rad/s2": "rad/s²"}
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a number with the given significant digits, never in powers of ten below a million."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    if value == 0.0:
+        return "0"
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    return f"{value:,.{decimals}f}"
+
+
+def unit(name: str) -> str:
+    """Return a unit as printed after a number."""
+    return _UNITS.get(name, name)
+
+
+def quantity(value: float | None, name: str, digits: int = 3) -> str:
+    """Return a number with its unit."""
+    return f"{number(value, digits)} {unit(name)}".strip()
+
+
+def interval(estimate: Mapping[str, float | None], digits: int = 3) -> str:
+    """Return ``value (low to high)`` of an estimate."""
+    low, high = estimate["low"], estimate["high"]
+    if low is None or high is None or not (math.isfinite(low) and math.isfinite(high)):
+        return number(estimate["value"], digits)
+    return f"{number(estimate['value'], digits)} ({number(low, digits)} to {number(high, digits)})"
+
+
+def percent(estimate: Mapping[str, float | None]) -> str:
+    """Return a probability with its interval in per cent."""
+    value, low, high = (estimate[k] for k in ("value", "low", "high"))
+    if value is None:
+        return "–"
+    if low is None or high is None:
+        return f"{100.0 * value:.1f} %"
+    return f"{100.0 * value:.1f} % ({100.0 * low:.1f} to {100.0 * high:.1f} %)"

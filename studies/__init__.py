@@ -1,0 +1,1 @@
+"""Pipelines: each kind of study composes methods and models into one analysis."""

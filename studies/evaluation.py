@@ -1,0 +1,32 @@
+"""What a worker process runs. It imports models only, no pandas, figures or reports."""
+
+import functools
+import json
+from typing import TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.protocol import Model
+from models.registry import load_model
+
+
+class ModelArgument(TypedDict):
+    """Plain data that names a model."""
+
+    name: str
+    options: dict[str, str]
+
+
+@functools.lru_cache(maxsize=4)
+def _model(name: str, options: str) -> Model:
+    return load_model(name, json.loads(options))
+
+
+def evaluate(
+    argument: ModelArgument, rows: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], list[str]]:
+    """Run rows of inputs and return outputs and statuses."""
+    model = _model(argument["name"], json.dumps(argument["options"], sort_keys=True))
+    batch = model.run_batch(rows)
+    return batch.outputs, batch.status

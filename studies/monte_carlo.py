@@ -1,0 +1,420 @@
+"""The Monte Carlo study: sample the inputs, run the model, describe what comes out."""
+
+import os
+import platform
+import time
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import joblib
+import numpy as np
+import pandas as pd
+
+from mcstudy import config, designs, runner, statistics
+from mcstudy.config import MonteCarloStudy, load_study
+from mcstudy.errors import UserError
+from mcstudy.figures import distributions, relations, style
+from mcstudy.progress import Progress
+from mcstudy.report import Section, Table, render
+from mcstudy.results import ResultsFolder, check_failures, digest
+from mcstudy.text import interval, number, percent, quantity, unit
+from models.protocol import OK, Model
+from models.registry import load_model
+from studies import evaluation
+
+PACKAGES = ("numpy", "scipy", "numba", "pandas", "joblib", "pyarrow")
+
+
+def load_study_model(study: config.Study) -> Model:
+    """Return the model of a study.
+
+    Raises
+    ------
+    UserError
+        If the model or an option is unknown.
+    """
+    try:
+        return load_model(study.model.name, study.model.options)
+    except (ValueError, TypeError) as error:
+        raise UserError(f"model: {error}") from None
+
+
+def run_monte_carlo(
+    study: MonteCarloStudy,
+    text: str,
+    folder: ResultsFolder,
+    *,
+    workers: int = -1,
+    quiet: bool = False,
+) -> dict[str, Any]:
+    """Run a study, or go on with it, and write its results folder.
+
+    Parameters
+    ----------
+    study : MonteCarloStudy
+    text : str
+        The study file as written.
+    folder : ResultsFolder
+    workers : int
+        Processes; -1 for one a core.
+    quiet : bool
+        No progress line.
+
+    Returns
+    -------
+    dict
+        The analysis, as in ``analysis.json``.
+
+    Raises
+    ------
+    UserError
+        If the study does not fit the model or the folder.
+    StudyError
+        If too many runs failed.
+    """
+    model = load_study_model(study)
+    config.check_outputs(study.report.outputs, model, "report.outputs")
+    marks_of(study, model)
+    columns = config.sample_inputs(study, model)
+    topics = config.numbers_digest(study, model)
+    folder.check_same_study(topics)
+    rows = np.stack([columns[item.name] for item in model.inputs], axis=1)
+    task = runner.Task(
+        evaluate=evaluation.evaluate,
+        argument={"name": study.model.name, "options": study.model.options},
+        inputs=rows,
+        input_names=[item.name for item in model.inputs],
+        output_names=[item.name for item in model.outputs],
+        replicate=np.arange(study.design.n) // study.design.size,
+    )
+    complete = frozenset({OK}) | model.partial_status
+    with folder.open_for_writing():
+        folder.write_text("study.toml", text)
+        manifest = _manifest(study, model, topics, workers)
+        if not (folder.path / "manifest.json").exists():
+            folder.write_json("manifest.json", manifest)
+        start = time.perf_counter()
+        with joblib.parallel_config(backend="loky", n_jobs=workers):
+            runs = runner.run(task, folder, Progress(quiet=quiet, complete=complete))
+        folder.compact(runs)
+        counts = {str(k): int(v) for k, v in runs["status"].value_counts().items()}
+        manifest |= {
+            "wall_time_s": round(time.perf_counter() - start, 3),
+            "counts": counts,
+            "digest": digest(runs),
+            "finished": True,
+        }
+        folder.write_json("manifest.json", manifest)
+        check_failures(counts, set(counts) - complete, study.max_failure_rate)
+        _keep_histories(study, model, runs, folder)
+        return build_report(folder)
+
+
+def build_report(folder: ResultsFolder) -> dict[str, Any]:
+    """Analyse a results folder and write its figures and report, without running the model.
+
+    Raises
+    ------
+    UserError
+        If the folder is not one of a finished Monte Carlo study.
+    """
+    study = load_study(folder.path / "study.toml")
+    if not isinstance(study, MonteCarloStudy):
+        raise UserError(f"{folder.path}: is not the folder of a Monte Carlo study")
+    model = load_study_model(study)
+    runs = folder.runs()
+    manifest = folder.read_json("manifest.json")
+    analysis = analyse(study, model, runs)
+    folder.write_json("analysis.json", analysis)
+    analysis = folder.read_json("analysis.json")
+    figures = draw(study, model, runs, analysis)
+    style.save(figures, folder.path / "figures")
+    sections = _sections(study, model, runs, manifest, analysis, figures)
+    subtitle = (
+        f"Monte Carlo study of {len(runs):,} runs of the {model.name} model, "
+        f"{study.design.method} design, seed {study.seed}"
+    )
+    folder.write_text("report.html", render(study.title, subtitle, sections))
+    return analysis
+
+
+def marks_of(study: MonteCarloStudy, model: Model) -> dict[str, list[distributions.Mark]]:
+    """Return the study's references by output, in the model's units.
+
+    Raises
+    ------
+    UserError
+        If an output or a unit does not fit the model.
+    """
+    known = {item.name: item for item in model.outputs}
+    marks: dict[str, list[distributions.Mark]] = {}
+    for k, entry in enumerate(study.report.references):
+        place = f"report.references[{k}]"
+        config.check_outputs([entry.output], model, place)
+        try:
+            value = entry.value * config.units.factor(entry.unit, known[entry.output].unit)
+        except ValueError as error:
+            raise UserError(f"{place}: {error}") from None
+        marks.setdefault(entry.output, []).append(
+            distributions.Mark(value, entry.label, entry.kind)
+        )
+    return marks
+
+
+def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[str, Any]:
+    """Return every number that the report prints."""
+    complete = runs[runs["status"].isin({OK} | model.partial_status)]
+    groups = None if study.design.method == "monte-carlo" else complete["replicate"].to_numpy()
+    marks = marks_of(study, model)
+    sampled = list(study.inputs)
+    analysis: dict[str, Any] = {
+        "runs": len(runs),
+        "status": {str(k): int(v) for k, v in runs["status"].value_counts().items()},
+        "outputs": {},
+        "exceedance": {},
+        "observed": {},
+        "convergence": {},
+    }
+    for item in model.outputs:
+        values = complete[item.name].to_numpy(dtype=float)
+        analysis["outputs"][item.name] = {"unit": item.unit} | statistics.describe(values, groups)
+    for name in study.report.outputs:
+        values = complete[name].to_numpy(dtype=float)
+        finite = np.isfinite(values)
+        part, parts = values[finite], None if groups is None else groups[finite]
+        analysis["convergence"][name] = statistics.convergence(
+            values, lambda v: float(np.median(v))
+        )
+        for mark in marks.get(name, ()):
+            above = statistics.probability(part > mark.value, parts).as_dict()
+            entry = {"value": mark.value, "label": mark.label, "probability_above": above}
+            if mark.kind == "observed":
+                low, high = np.quantile(part, [0.05, 0.95])
+                entry["inside_central_90"] = bool(low <= mark.value <= high)
+                entry["percentile"] = float(np.mean(part <= mark.value))
+                analysis["observed"].setdefault(name, []).append(entry)
+            else:
+                analysis["exceedance"].setdefault(name, []).append(entry)
+    ranks = complete[[*sampled, *study.report.outputs]].corr("spearman")
+    table = ranks.loc[sampled, study.report.outputs]
+    analysis["rank_correlation"] = {
+        name: {k: float(v) for k, v in table[name].items()} for name in study.report.outputs
+    }
+    # |rho| of unrelated ranks stays below this in 95 of 100 cases.
+    analysis["rank_correlation_noise"] = float(1.96 / np.sqrt(max(len(complete) - 1, 1)))
+    return analysis
+
+
+def draw(
+    study: MonteCarloStudy, model: Model, runs: pd.DataFrame, analysis: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return the study's figures by file name."""
+    complete = runs[runs["status"].isin({OK} | model.partial_status)]
+    units = {item.name: item.unit for item in model.outputs}
+    wanted = {name: units[name] for name in study.report.outputs}
+    marks = marks_of(study, model)
+    figures = {
+        "distributions": distributions.draw_distributions(
+            complete, wanted, marks, analysis["outputs"]
+        ),
+        "rank_correlation": relations.draw_correlations(
+            pd.DataFrame(analysis["rank_correlation"]), analysis["rank_correlation_noise"]
+        ),
+        "convergence": relations.draw_convergence(analysis["convergence"], wanted),
+    }
+    if "impact_speed" in study.inputs:
+        shown = complete.assign(impact_speed=3.6 * complete["impact_speed"])
+        figures["impact_speed"] = relations.draw_against_input(
+            shown, "impact_speed", "impact speed [km/h]", wanted, marks
+        )
+    if {"throw_distance", "wad"} <= set(wanted):
+        point = {
+            name: mark.value for name, items in marks.items() for mark in items
+            if mark.kind == "observed"
+        }  # fmt: skip
+        figures["throw_and_wad"] = relations.draw_joint(
+            complete, ("throw_distance", "m"), ("wad", "m"), point
+        )
+    return figures
+
+
+def _keep_histories(
+    study: MonteCarloStudy, model: Model, runs: pd.DataFrame, folder: ResultsFolder
+) -> None:
+    """Write the time histories of the study's first runs."""
+    names = [item.name for item in model.inputs]
+    for k in range(min(study.report.histories, len(runs))):
+        row = runs.iloc[k]
+        run = model.run({name: float(row[name]) for name in names})
+        for group, history in run.histories.items():
+            frame = pd.DataFrame({"time": history.time} | dict(history.channels))
+            folder.write_frame(f"histories/run-{int(row['run']):06d}/{group}.parquet", frame)
+
+
+def _manifest(
+    study: MonteCarloStudy, model: Model, topics: Mapping[str, str], workers: int
+) -> dict[str, Any]:
+    return {
+        "format": "mcstudy-results/1",
+        "study": study.name,
+        "kind": study.kind,
+        "seed": study.seed,
+        "model": {"name": model.name, "version": model.version, "options": study.model.options},
+        "design": {"method": study.design.method, "n": study.design.n,
+                   "replicate_size": study.design.size},
+        "numbers": dict(topics),
+        "hash": config.hash_of(dict(topics)),
+        "versions": {"mcstudy": version("mcstudy"), "python": platform.python_version()}
+        | {name: version(name) for name in PACKAGES},
+        "machine": {"system": platform.system(), "processor": platform.machine(),
+                    "cores": os.cpu_count()},
+        "workers": workers,
+        "finished": False,
+    }  # fmt: skip
+
+
+def _sections(
+    study: MonteCarloStudy,
+    model: Model,
+    runs: pd.DataFrame,
+    manifest: Mapping[str, Any],
+    analysis: Mapping[str, Any],
+    figures: Mapping[str, Any],
+) -> list[Section]:
+    captions = {
+        "distributions": "Above: runs by output; shaded the central 90 %, the median with its 95 % "
+        "interval. Below: cumulative share with a 95 % band for the whole curve. The widest "
+        "0.2 % of the runs at either end lie outside the picture above.",
+        "throw_and_wad": "Throw and wrap-around distance of every run with the accident's own pair.",
+        "impact_speed": "Outputs against impact speed: median and 90 % band of the runs around it.",
+        "rank_correlation": "Spearman rank correlation of inputs and outputs; grey: not "
+        "distinguishable from zero.",
+        "convergence": "Median over growing parts of the study.",
+    }
+
+    def pick(*names: str) -> dict[str, Any]:
+        return {captions[name]: figures[name] for name in names if name in figures}
+
+    return [
+        Section("Result", _summary(study, model, analysis), [_output_table(study, model, analysis)],
+                pick("distributions")),
+        Section("The accident", _accident(analysis, model), (), pick("throw_and_wad")),
+        Section("What goes with what", (
+            "Rank correlations say which inputs an output follows, one at a time; they are no "
+            "share of variance.",), (), pick("impact_speed", "rank_correlation")),
+        Section("Inputs", (), [_input_table(study, model, runs)]),
+        Section("How sure the numbers are", (_honesty(study),), [_status_table(manifest)],
+                pick("convergence")),
+        Section("The model", _model_notes(model)),
+    ]  # fmt: skip
+
+
+def _summary(study: MonteCarloStudy, model: Model, analysis: Mapping[str, Any]) -> list[str]:
+    units = {item.name: item.unit for item in model.outputs}
+    lines = []
+    for name in study.report.outputs:
+        q = analysis["outputs"][name]["quantiles"]
+        u = unit(units[name])
+        lines.append(
+            f"{style.words(name)}: median {interval(q['0.5'])} {u}; nine runs in ten lie between "
+            f"{number(q['0.05']['value'])} and {number(q['0.95']['value'])} {u}.".replace(" .", ".")
+        )
+    for name, entries in analysis["exceedance"].items():
+        lines += [
+            f"{style.words(name)} exceeds {quantity(e['value'], units[name])} ({e['label']}) in "
+            f"{percent(e['probability_above'])} of the runs."
+            for e in entries
+        ]
+    return lines
+
+
+def _accident(analysis: Mapping[str, Any], model: Model) -> list[str]:
+    units = {item.name: item.unit for item in model.outputs}
+    lines = []
+    for name, entries in analysis["observed"].items():
+        for e in entries:
+            where = "inside" if e["inside_central_90"] else "OUTSIDE"
+            lines.append(
+                f"{style.words(name)}: the observed {quantity(e['value'], units[name])} "
+                f"({e['label']}) lies {where} the central 90 % of the prediction, at its "
+                f"{100.0 * e['percentile']:.0f} % point."
+            )
+    return lines or ["The study file names no observed values."]
+
+
+def _output_table(study: MonteCarloStudy, model: Model, analysis: Mapping[str, Any]) -> Table:
+    rows = []
+    for item in model.outputs:
+        entry = analysis["outputs"][item.name]
+        if "mean" not in entry:
+            continue
+        q = entry["quantiles"]
+        rows.append(
+            [
+                item.name,
+                unit(item.unit) or "–",
+                interval(entry["mean"]),
+                number(entry["sd"]["value"]),
+                *(number(q[p]["value"]) for p in ("0.05", "0.5", "0.95")),
+                str(entry["undefined"]),
+            ]
+        )
+    head = ["output", "unit", "mean (95 % interval)", "sd", "5 %", "median", "95 %", "undefined"]
+    return Table("All outputs. 'undefined' counts runs in which an output has no value.", head, rows)
+
+
+def _input_table(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> Table:
+    rows = []
+    for item in model.inputs:
+        if item.name in study.inputs:
+            spec = study.inputs[item.name]
+            scale = 1.0 / config.units.factor(spec.unit, item.unit)
+            low, middle, high = np.quantile(runs[item.name] * scale, [0.05, 0.5, 0.95])
+            shown = [spec.distribution, number(low), number(middle), number(high), unit(spec.unit)]
+        else:
+            value = float(runs[item.name].iloc[0])
+            shown = ["fixed", "", number(value), "", unit(item.unit)]
+        rows.append([item.name, *shown, item.meaning])
+    head = ["input", "distribution", "5 %", "median or value", "95 %", "unit", "meaning"]
+    return Table("Inputs as sampled, in the study file's units.", head, rows)
+
+
+def _status_table(manifest: Mapping[str, Any]) -> Table:
+    rows: Sequence[Sequence[str]] = [
+        [status, f"{count:,}"] for status, count in manifest["counts"].items()
+    ]
+    return Table("How the runs ended.", ["status", "runs"], rows)
+
+
+def _honesty(study: MonteCarloStudy) -> str:
+    if study.design.method == "monte-carlo":
+        return (
+            "Samples are independent: quantiles have order-statistic intervals, probabilities "
+            "Wilson intervals, means t intervals, all at 95 %. They count the sampling error only, "
+            "not what the model itself gets wrong."
+        )
+    return (
+        f"The design is {study.design.n // study.design.size} independent replicates of "
+        f"{study.design.size} samples; every interval is a 95 % t interval from the spread between "
+        "the replicates. It counts the sampling error only, not what the model itself gets wrong."
+    )
+
+
+def _model_notes(model: Model) -> list[str]:
+    calibrated = [item for item in model.inputs if item.source.startswith("calibrated")]
+    lines = [f"Model {model.name}, version {model.version}."]
+    if calibrated:
+        lines.append(
+            "Calibrated to the multibody rows of the case's tables (throw, WAD, HIC15, head dent): "
+            + ", ".join(f"{item.name} (nominal {quantity(item.nominal, item.unit)})"
+                        for item in calibrated)  # fmt: skip
+            + ". Every other output of the nominal run is a prediction."
+        )
+    return lines
+
+
+def study_text(path: Path) -> str:
+    """Return the text of a study file."""
+    return path.read_text(encoding="utf-8")

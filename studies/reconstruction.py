@@ -1,0 +1,206 @@
+"""The reconstruction: one run, printed beside published tables and drawn."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mcstudy import config, units
+from mcstudy.config import ComparisonTable, Reconstruction
+from mcstudy.errors import StudyError, UserError
+from mcstudy.figures import crash, style
+from mcstudy.report import Section, Table, render
+from mcstudy.results import ResultsFolder
+from mcstudy.text import number, quantity, unit
+from models.protocol import OK, Model, Run
+from studies.monte_carlo import load_study_model
+
+PRIMARY = 0.12
+"""s after first contact that the histories show: the impact on the car."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A published table with our row: title, head, rows of numbers, last row ours."""
+
+    title: str
+    head: list[str]
+    rows: list[tuple[str, list[float | None]]]
+
+
+def reconstruct(study: Reconstruction) -> tuple[Run, list[Comparison]]:
+    """Run the study's case once.
+
+    Returns
+    -------
+    run : Run
+        With histories and scene.
+    tables : list of Comparison
+
+    Raises
+    ------
+    UserError
+        If the study does not fit the model.
+    StudyError
+        If the run failed.
+    """
+    model = load_study_model(study)
+    values = config.fixed_values(study, model)
+    for k, table in enumerate(study.tables):
+        config.check_outputs(list(table.units), model, f"tables[{k}].units")
+        for j, row in enumerate(table.rows):
+            unknown = sorted(set(row.values) - set(table.units))
+            if unknown:
+                raise UserError(f"tables[{k}].rows[{j}].values.{unknown[0]}: has no unit in units")
+    run = model.run(values)
+    if run.status not in {OK} | model.partial_status:
+        raise StudyError(f"the run ended with status {run.status!r}")
+    return run, [_compare(table, run, model) for table in study.tables]
+
+
+def _compare(table: ComparisonTable, run: Run, model: Model) -> Comparison:
+    si = {item.name: item.unit for item in model.outputs}
+    names = list(table.units)
+    try:
+        scale = {name: units.factor(si[name], table.units[name]) for name in names}
+    except ValueError as error:
+        raise UserError(f"tables {table.title!r}: {error}") from None
+    rows: list[tuple[str, list[float | None]]] = [
+        (row.label, [row.values.get(name) for name in names]) for row in table.rows
+    ]
+    rows.append(("this run", [run.outputs[name] * scale[name] for name in names]))
+    head = [f"{style.words(n)} [{unit(table.units[n]) or '–'}]" for n in names]
+    return Comparison(table.title, head, rows)
+
+
+def draw(study: Reconstruction, run: Run) -> dict[str, Any]:
+    """Return the figures of a run by file name."""
+    head, contact = run.histories["head"], run.histories["contact_force"]
+    hit = run.outputs["head_impact_time"]
+    marks = {"head meets the car": hit} if np.isfinite(hit) else {}
+    figures = {
+        "head_velocity": crash.draw_history(
+            head.time,
+            {"resultant": head.channels["velocity_relative_to_car"]},
+            ylabel="head velocity relative to the car [m/s]",
+            until=PRIMARY,
+            marks=marks,
+        ),
+        "head_acceleration": crash.draw_history(
+            head.time,
+            {"resultant, CFC 1000": head.channels["acceleration"]},
+            ylabel="head acceleration [g]",
+            until=PRIMARY,
+            marks=marks,
+        ),
+        "contact_force": crash.draw_history(
+            contact.time,
+            {
+                name.replace("_", " "): values / 1000.0
+                for name, values in contact.channels.items()
+                if values[contact.time <= PRIMARY].max() > 0.0
+            },
+            ylabel="contact force, sum over segments [kN]",
+            until=PRIMARY,
+        ),
+        "head_angular_acceleration": crash.draw_history(
+            head.time,
+            {"resultant, CFC 180": head.channels["angular_acceleration"]},
+            ylabel="head angular acceleration [rad/s²]",
+            until=PRIMARY,
+            marks=marks,
+        ),
+    }
+    if run.scene is not None:
+        figures = {"kinematics": crash.draw_strip(run.scene, study.strip_times)} | figures
+    return figures
+
+
+def write_reconstruction(
+    study: Reconstruction, text: str, run: Run, tables: list[Comparison], folder: ResultsFolder
+) -> None:
+    """Write the results folder of a reconstruction: outputs, histories, figures, GIF, report."""
+    model = load_study_model(study)
+    with folder.open_for_writing():
+        folder.write_text("study.toml", text)
+        folder.write_json(
+            "analysis.json",
+            {
+                "inputs": dict(run.inputs),
+                "status": run.status,
+                "end_reason": run.end_reason,
+                "outputs": dict(run.outputs),
+                "work": {k: float(v[0]) for k, v in run.histories["work"].channels.items()},
+            },
+        )
+        for group, history in run.histories.items():
+            frame = pd.DataFrame({"time": history.time} | dict(history.channels))
+            folder.write_frame(f"histories/run-000000/{group}.parquet", frame)
+        figures = draw(study, run)
+        style.save(figures, folder.path / "figures")
+        animations = {}
+        if run.scene is not None:
+            gif = folder.path / "figures" / "crash.gif"
+            crash.write_animation(run.scene, gif)
+            animations["The whole crash, from the side and from above."] = gif.read_bytes()
+        folder.write_text("report.html", _report(study, model, run, tables, figures, animations))
+
+
+def _report(
+    study: Reconstruction,
+    model: Model,
+    run: Run,
+    tables: list[Comparison],
+    figures: dict[str, Any],
+    animations: dict[str, bytes],
+) -> str:
+    captions = {
+        "kinematics": "The body from the side, in the car's frame.",
+        "head_velocity": "Velocity of the head's centre of gravity relative to the car.",
+        "head_acceleration": "Resultant acceleration of the head's centre of gravity.",
+        "contact_force": "Contact force of each zone of the car.",
+        "head_angular_acceleration": "Resultant angular acceleration of the head.",
+    }
+    outputs = [
+        [item.name, quantity(run.outputs[item.name], item.unit, 4), item.meaning]
+        for item in model.outputs
+    ]
+    inputs = [
+        [item.name, quantity(run.inputs[item.name], item.unit, 4), item.source]
+        for item in model.inputs
+    ]
+    work = [[name.replace("_", " "), f"{values[0]:,.1f}"]
+            for name, values in run.histories["work"].channels.items()]  # fmt: skip
+    return render(
+        study.title,
+        f"One run of the {model.name} model; it ended with {run.end_reason.replace('_', ' ')} "
+        f"after {run.outputs['crash_duration']:.2f} s.",
+        [
+            Section("Beside the published tables", (), [as_table(table) for table in tables]),
+            Section("Kinematics", (), (), {captions["kinematics"]: figures["kinematics"]}
+                    if "kinematics" in figures else {}, animations),
+            Section("Histories", (), (), {captions[name]: figure for name, figure in figures.items()
+                                          if name != "kinematics"}),
+            Section("Numbers", (), [
+                Table("Outputs", ["output", "value", "meaning"], outputs),
+                Table("Inputs", ["input", "value", "source"], inputs),
+                Table("Work on the body by kind; the energy residual is what they leave "
+                      "unexplained.", ["kind", "work [J]"], work)]),
+        ],
+    )  # fmt: skip
+
+
+def as_table(comparison: Comparison) -> Table:
+    """Return a comparison as a table of text."""
+    return Table(
+        comparison.title,
+        ["", *comparison.head],
+        [[label, *(number(value, 4) for value in values)] for label, values in comparison.rows],
+    )
+
+
+def default_folder(study: config.Study, out: Path | None) -> ResultsFolder:
+    """Return the results folder of a study: ``--out`` or ``results/<name>``."""
+    return ResultsFolder(out if out is not None else Path("results") / study.name)

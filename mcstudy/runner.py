@@ -81,7 +81,11 @@ def _run_chunks(task: Task, missing: NDArray[np.int64]) -> Iterable[pd.DataFrame
     size = _chunk_size(task, missing)
     chunks = [missing[k : k + size] for k in range(0, missing.size, size)]
     # With one worker joblib runs in this process, as it should: nothing to send.
-    workers = Parallel(return_as="generator_unordered", batch_size=1, timeout=STALL_TIME)
+    workers = Parallel(
+        return_as="generator_unordered",
+        batch_size=1,
+        timeout=STALL_TIME if effective_n_jobs() > 1 else None,
+    )
     try:
         for ids, outputs, status in workers(
             delayed(_evaluate)(task.evaluate, task.argument, ids, task.inputs[ids])

@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -146,7 +147,7 @@ def draw_history(
         return figure
 
 
-def write_animation(scene: SceneLike, path: Path, *, frames: int = 150) -> None:
+def write_animation(scene: SceneLike, path: Path, *, frames: int = 120) -> None:
     """Write a GIF of the whole crash from the side and from above.
 
     Time runs slowly at first (the impact) and faster afterwards; the clock is on the picture.
@@ -158,23 +159,36 @@ def write_animation(scene: SceneLike, path: Path, *, frames: int = 150) -> None:
     chosen = _animation_frames(scene.time, frames)
     low = scene.centre[:, :, 0].min() - 0.8
     high = max(scene.centre[:, :, 0].max(), scene.car[:, 0].max()) + 0.6
+    right = min(float(scene.centre[:, :, 1].min()), -1.0) - 0.4
+    left = max(float(scene.centre[:, :, 1].max()), float(scene.car[:, 1].max()) + 1.0) + 0.4
+    width = 9.6
+    scale = 0.88 * width / (high - low)  # inches a metre, equal on both views
+    side_height, plan_height = 2.7 * scale, (left - right) * scale
+    height = side_height + plan_height + 1.4
     pictures = []
     with style.styled():
+        figure = Figure(figsize=(width, height), dpi=90)
+        canvas = FigureCanvasAgg(figure)
+        above = figure.add_axes((0.08, 0.5 / height, 0.88, plan_height / height))
+        bottom = (0.5 + plan_height + 0.55) / height
+        side = figure.add_axes((0.08, bottom, 0.88, side_height / height))
         for frame in chosen:
-            figure = style.new_figure(9.6, 4.4)
-            side, above = figure.subplots(2, 1, height_ratios=[1.0, 1.35])
+            for axes in (side, above):
+                axes.clear()
+                axes.set_xlim(low, high)
             _draw_car_side(side, scene, float(scene.car[frame, 0]))
             _draw_body(side, scene, frame, (0, 2), (0.0, 0.0))
             side.axhline(0.0, color="#333333", linewidth=0.8)
-            side.set(xlim=(low, high), ylim=(-0.1, 2.6), aspect="equal", ylabel="height [m]")
+            side.set_ylim(-0.1, 2.6)
+            side.set_ylabel("height [m]")
             side.set_title(f"t = {1e3 * scene.time[frame]:.0f} ms", loc="left")
             _draw_car_plan(above, scene, frame)
             _draw_body(above, scene, frame, (0, 1), (0.0, 0.0))
-            middle = float(scene.centre[:, :, 1].mean())
-            above.set(xlim=(low, high), ylim=(middle - 2.6, middle + 2.6), aspect="equal")
-            above.set(xlabel="x along the road [m]", ylabel="y, left [m]")
-            figure.canvas.draw()
-            image = np.asarray(figure.canvas.buffer_rgba())[..., :3]  # type: ignore[attr-defined]
+            above.set_ylim(right, left)
+            above.set_xlabel("x along the road [m]")
+            above.set_ylabel("y, left [m]")
+            canvas.draw()
+            image = np.asarray(canvas.buffer_rgba())[..., :3]
             pictures.append(Image.fromarray(image).quantize(64))
     path.parent.mkdir(parents=True, exist_ok=True)
     pictures[0].save(

@@ -52,6 +52,7 @@ def draw_distributions(
             _cumulative(axes[1, k], values, marks.get(name, ()))
             axes[1, k].set_xlabel(style.label(name, unit))
             axes[0, k].set_title(style.words(name))
+            axes[0, k].set_ylabel("")
         axes[0, 0].set_ylabel("runs in the bin [–]")
         axes[1, 0].set_ylabel("share of runs below [–]")
         return figure

@@ -1,0 +1,127 @@
+"""Speed of the core beside MuJoCo's on the same tree; run with ``make benchmark``.
+
+No assertion here is timed. The ratio of the two is printed at the end of the module.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from models.compilation import kernel
+from models.criteria import head_injury_criterion
+from models.multibody.integration import correct, predict
+from models.multibody.model import MultibodyModel
+from models.multibody.setup import build_tree
+from models.multibody.simulation import S_STEPS, empty_scratch
+from models.multibody.tree import (
+    Tree,
+    empty_loads,
+    empty_motion,
+    solve_accelerations,
+    update_kinematics,
+)
+from models.pedestrian.anthropometry import build_body
+
+STEPS = 1000
+medians: dict[str, float] = {}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def ratio() -> Iterator[None]:
+    yield
+    if {"ours", "mujoco"} <= set(medians):
+        ours, theirs = medians["ours"] / STEPS, medians["mujoco"] / STEPS
+        print(
+            f"\nfree tree: ours {1e6 * ours:.2f} us a step, MuJoCo {1e6 * theirs:.2f} us, "
+            f"ratio {theirs / ours:.1f}"
+        )
+    if "crash" in medians:
+        print(
+            f"crash with contacts: {1e3 * medians['crash']:.1f} ms, {medians['steps']:.0f} steps, "
+            f"{1e6 * medians['crash'] / medians['steps']:.2f} us a step"
+        )
+
+
+def median_of(benchmark: Any) -> float:
+    return float(benchmark.stats.stats.median) if benchmark.stats else float("nan")
+
+
+def child_tree() -> Tree:
+    return build_tree(build_body(7.0, 1.22, 23.2, 3.26))
+
+
+def mujoco_twin(tree: Tree) -> tuple[Any, Any]:
+    def numbers(values: np.ndarray) -> str:
+        return " ".join(f"{v:.17g}" for v in values)
+
+    def body(i: int) -> str:
+        joint = "<freejoint/>" if i == 0 else '<joint type="ball"/>'
+        children = "".join(body(k) for k in range(tree.mass.size) if tree.parent[k] == i)
+        return (
+            f'<body pos="{numbers(tree.joint_in_parent[i])}">{joint}'
+            f'<inertial pos="{numbers(tree.centre_from_joint[i])}" mass="{tree.mass[i]:.17g}" '
+            f'diaginertia="{numbers(tree.inertia[i])}"/>{children}</body>'
+        )
+
+    xml = (
+        '<mujoco><option timestep="1e-4"/>'
+        f"<worldbody>{body(0)}</worldbody></mujoco>"
+    )
+    model = mujoco.MjModel.from_xml_string(xml)
+    return model, mujoco.MjData(model)
+
+
+@kernel
+def free_steps(tree, motion, loads, scratch, h, n):  # type: ignore[no-untyped-def]
+    for _ in range(n):
+        predict(
+            motion, loads, scratch.old_spin, scratch.old_velocity, scratch.old_alpha,
+            scratch.old_acceleration, h,
+        )  # fmt: skip
+        update_kinematics(tree, motion)
+        solve_accelerations(tree, motion, loads)
+        correct(
+            motion, loads, scratch.old_spin, scratch.old_velocity, scratch.old_alpha,
+            scratch.old_acceleration, h,
+        )  # fmt: skip
+
+
+@pytest.fixture
+def spin() -> np.ndarray:
+    return np.random.default_rng(5).normal(0.0, 5.0, (15, 3))
+
+
+def test_our_free_tree(benchmark: Callable[..., Any], spin: np.ndarray) -> None:
+    tree, motion, loads = child_tree(), empty_motion(15), empty_loads(15)
+    motion.angular_velocity[:] = spin
+    benchmark(free_steps, tree, motion, loads, empty_scratch(15), 1e-4, STEPS)
+    medians["ours"] = median_of(benchmark)
+    assert np.isfinite(motion.centre).all()
+
+
+def test_mujoco_free_tree(benchmark: Callable[..., Any], spin: np.ndarray) -> None:
+    model, state = mujoco_twin(child_tree())
+    state.qvel[3:] = spin.ravel()
+    benchmark(mujoco.mj_step, model, state, STEPS)
+    medians["mujoco"] = median_of(benchmark)
+    assert np.isfinite(state.qpos).all()
+
+
+def test_whole_crash(benchmark: Callable[..., Any]) -> None:
+    model = MultibodyModel()
+    values = {item.name: item.nominal for item in model.inputs}
+    raw = benchmark(model._simulate, values)
+    medians["crash"] = median_of(benchmark)
+    medians["steps"] = float(raw.summary[S_STEPS])
+    assert raw.summary[S_STEPS] > 1000
+
+
+def test_head_injury_criterion(benchmark: Callable[..., Any]) -> None:
+    rng = np.random.default_rng(0)
+    time = np.arange(2000) * 1e-4
+    pulse = np.abs(150.0 * np.exp(-(((time - 0.08) / 0.006) ** 2)) + rng.normal(0.0, 3.0, 2000))
+    hic, _, _ = benchmark(head_injury_criterion, time, pulse)
+    assert hic > 100.0

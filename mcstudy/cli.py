@@ -32,7 +32,11 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and no
 
 @app.command()
 def run(
-    study: Study, out: Out = None, workers: Workers = -1, quiet: Quiet = False, as_json: Json = False
+    study: Study,
+    out: Out = None,
+    workers: Workers = -1,
+    quiet: Quiet = False,
+    as_json: Json = False,
 ) -> None:
     """Run a study, or go on with it where it stopped, and write its report."""
     from mcstudy.config import MonteCarloStudy, load_study
@@ -55,9 +59,7 @@ def run(
 
 
 @app.command()
-def reconstruct(
-    study: Study, out: Out = None, quiet: Quiet = False, as_json: Json = False
-) -> None:
+def reconstruct(study: Study, out: Out = None, quiet: Quiet = False, as_json: Json = False) -> None:
     """Run one case, print it beside published tables and draw it."""
     from mcstudy.config import Reconstruction, load_study
     from studies import monte_carlo, reconstruction
@@ -99,7 +101,9 @@ def status(folder: Folder, as_json: Json = False) -> None:
     manifest = results.read_json("manifest.json")
     runs = results.done()
     done = 0 if runs is None else len(runs)
-    counts = {} if runs is None else {str(k): int(v) for k, v in runs["status"].value_counts().items()}
+    counts = (
+        {} if runs is None else {str(k): int(v) for k, v in runs["status"].value_counts().items()}
+    )
     total = int(manifest["design"]["n"])
     if as_json:
         _print_json({"done": done, "total": total, "counts": counts})

@@ -29,7 +29,6 @@ class _Distribution(_Table):
         return ()
 
 
-
 class Uniform(_Distribution):
     """Equally probable between ``low`` and ``high``."""
 
@@ -215,7 +214,9 @@ def copula_factor(names: Sequence[str], correlations: Sequence[tuple[str, str, f
         if len(pair) == 1 or pair in seen:
             raise ValueError(f"the pair {first!r}, {second!r} is repeated or of one input")
         if not -1.0 < value < 1.0:
-            raise ValueError(f"correlation {value:g} of {first!r}, {second!r} is not within -1 and 1")
+            raise ValueError(
+                f"correlation {value:g} of {first!r}, {second!r} is not within -1 and 1"
+            )
         seen.add(pair)
         i, j = names.index(first), names.index(second)
         matrix[i, j] = matrix[j, i] = value

@@ -15,7 +15,6 @@
 import contextlib
 import hashlib
 import json
-import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -75,7 +74,7 @@ class ResultsFolder:
         target.parent.mkdir(parents=True, exist_ok=True)
         temporary = target.with_name(f".{target.name}.tmp")
         temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, target)
+        temporary.replace(target)
 
     def write_json(self, name: str, content: Any) -> None:
         """Write a JSON file at once; NaN becomes null."""
@@ -87,7 +86,7 @@ class ResultsFolder:
         target.parent.mkdir(parents=True, exist_ok=True)
         temporary = target.with_name(f".{target.name}.tmp")
         pq.write_table(pa.Table.from_pandas(frame, preserve_index=False), temporary)
-        os.replace(temporary, target)
+        temporary.replace(target)
 
     def add_part(self, frame: pd.DataFrame) -> None:
         """Keep a chunk of runs."""
@@ -120,7 +119,8 @@ class ResultsFolder:
         if not frames:
             return None
         runs = pd.concat(frames, ignore_index=True).drop_duplicates("run")
-        return runs.sort_values("run", ignore_index=True)
+        ordered: pd.DataFrame = runs.sort_values("run", ignore_index=True)
+        return ordered
 
     def runs(self) -> pd.DataFrame:
         """Return the table of runs.

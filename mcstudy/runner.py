@@ -5,6 +5,7 @@ plain rows for a top-level function, so nothing of the driver travels with it.
 """
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -72,9 +73,10 @@ def run(task: Task, folder: ResultsFolder, progress: Progress) -> pd.DataFrame:
         for frame in _run_chunks(task, missing):
             folder.add_part(frame)
             frames.append(frame)
-            progress.advance(len(frame), frame["status"].value_counts().to_dict())
+            progress.advance(len(frame), Counter(frame["status"].tolist()))
     progress.finish()
-    return pd.concat(frames, ignore_index=True).sort_values("run", ignore_index=True)
+    runs: pd.DataFrame = pd.concat(frames, ignore_index=True)
+    return runs.sort_values("run", ignore_index=True)
 
 
 def _run_chunks(task: Task, missing: NDArray[np.int64]) -> Iterable[pd.DataFrame]:
@@ -114,9 +116,7 @@ def _evaluate(
     return ids, outputs, status
 
 
-def _frame(
-    task: Task, ids: NDArray[np.int64], outputs: Array, status: list[str]
-) -> pd.DataFrame:
+def _frame(task: Task, ids: NDArray[np.int64], outputs: Array, status: list[str]) -> pd.DataFrame:
     columns: dict[str, Any] = {"run": ids, "replicate": task.replicate[ids]}
     columns |= {name: task.inputs[ids, k] for k, name in enumerate(task.input_names)}
     columns |= {name: outputs[:, k] for k, name in enumerate(task.output_names)}

@@ -43,8 +43,9 @@ def mean(values: Array, replicate: NDArray[np.int64] | None = None) -> Estimate:
 
 
 def standard_deviation(values: Array, replicate: NDArray[np.int64] | None = None) -> Estimate:
-    """Return the standard deviation; its interval for independent samples is the bootstrap-free
-    large-sample one, from the variance of the squared deviations.
+    """Return the standard deviation with an interval.
+
+    For independent samples it is the large-sample one, from the variance of squared deviations.
     """
     value = float(values.std(ddof=1)) if values.size > 1 else np.nan
     if replicate is not None:

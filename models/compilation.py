@@ -38,13 +38,14 @@ if "NUMBA_CACHE_DIR" not in os.environ:
 
 
 def _compile(function: Callable[..., Any], inline: bool) -> Callable[..., Any]:
-    compiled: Callable[..., Any] = numba.njit(
-        cache=True,
-        error_model="numpy",
-        fastmath={"contract"},
-        forceinline=inline,
-        _nrt=False,
-    )(function)
+    flags: dict[str, Any] = {
+        "cache": True,
+        "error_model": "numpy",
+        "fastmath": {"contract"},
+        "forceinline": inline,
+        "_nrt": False,
+    }
+    compiled: Callable[..., Any] = numba.njit(**flags)(function)
     return compiled
 
 

@@ -12,7 +12,7 @@ import joblib
 import numpy as np
 import pandas as pd
 
-from mcstudy import config, designs, runner, statistics
+from mcstudy import config, runner, statistics, units
 from mcstudy.config import MonteCarloStudy, load_study
 from mcstudy.errors import UserError
 from mcstudy.figures import distributions, relations, style
@@ -154,7 +154,7 @@ def marks_of(study: MonteCarloStudy, model: Model) -> dict[str, list[distributio
         place = f"report.references[{k}]"
         config.check_outputs([entry.output], model, place)
         try:
-            value = entry.value * config.units.factor(entry.unit, known[entry.output].unit)
+            value = entry.value * units.factor(entry.unit, known[entry.output].unit)
         except ValueError as error:
             raise UserError(f"{place}: {error}") from None
         marks.setdefault(entry.output, []).append(
@@ -212,8 +212,8 @@ def draw(
 ) -> dict[str, Any]:
     """Return the study's figures by file name."""
     complete = runs[runs["status"].isin({OK} | model.partial_status)]
-    units = {item.name: item.unit for item in model.outputs}
-    wanted = {name: units[name] for name in study.report.outputs}
+    unit_of = {item.name: item.unit for item in model.outputs}
+    wanted = {name: unit_of[name] for name in study.report.outputs}
     marks = marks_of(study, model)
     figures = {
         "distributions": distributions.draw_distributions(
@@ -287,7 +287,7 @@ def _sections(
         "distributions": "Above: runs by output; shaded the central 90 %, the median with its 95 % "
         "interval. Below: cumulative share with a 95 % band for the whole curve. The widest "
         "0.2 % of the runs at either end lie outside the picture above.",
-        "throw_and_wad": "Throw and wrap-around distance of every run with the accident's own pair.",
+        "throw_and_wad": "Throw and wrap-around distance of every run, and the accident's own.",
         "impact_speed": "Outputs against impact speed: median and 90 % band of the runs around it.",
         "rank_correlation": "Spearman rank correlation of inputs and outputs; grey: not "
         "distinguishable from zero.",
@@ -312,18 +312,18 @@ def _sections(
 
 
 def _summary(study: MonteCarloStudy, model: Model, analysis: Mapping[str, Any]) -> list[str]:
-    units = {item.name: item.unit for item in model.outputs}
+    unit_of = {item.name: item.unit for item in model.outputs}
     lines = []
     for name in study.report.outputs:
         q = analysis["outputs"][name]["quantiles"]
-        u = unit(units[name])
+        u = unit(unit_of[name])
         lines.append(
             f"{style.words(name)}: median {interval(q['0.5'])} {u}; nine runs in ten lie between "
             f"{number(q['0.05']['value'])} and {number(q['0.95']['value'])} {u}.".replace(" .", ".")
         )
     for name, entries in analysis["exceedance"].items():
         lines += [
-            f"{style.words(name)} exceeds {quantity(e['value'], units[name])} ({e['label']}) in "
+            f"{style.words(name)} exceeds {quantity(e['value'], unit_of[name])} ({e['label']}) in "
             f"{percent(e['probability_above'])} of the runs."
             for e in entries
         ]
@@ -331,13 +331,13 @@ def _summary(study: MonteCarloStudy, model: Model, analysis: Mapping[str, Any]) 
 
 
 def _accident(analysis: Mapping[str, Any], model: Model) -> list[str]:
-    units = {item.name: item.unit for item in model.outputs}
+    unit_of = {item.name: item.unit for item in model.outputs}
     lines = []
     for name, entries in analysis["observed"].items():
         for e in entries:
             where = "inside" if e["inside_central_90"] else "OUTSIDE"
             lines.append(
-                f"{style.words(name)}: the observed {quantity(e['value'], units[name])} "
+                f"{style.words(name)}: the observed {quantity(e['value'], unit_of[name])} "
                 f"({e['label']}) lies {where} the central 90 % of the prediction, at its "
                 f"{100.0 * e['percentile']:.0f} % point."
             )
@@ -362,7 +362,9 @@ def _output_table(study: MonteCarloStudy, model: Model, analysis: Mapping[str, A
             ]
         )
     head = ["output", "unit", "mean (95 % interval)", "sd", "5 %", "median", "95 %", "undefined"]
-    return Table("All outputs. 'undefined' counts runs in which an output has no value.", head, rows)
+    return Table(
+        "All outputs. 'undefined' counts runs in which an output has no value.", head, rows
+    )
 
 
 def _input_table(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> Table:
@@ -370,7 +372,7 @@ def _input_table(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> Ta
     for item in model.inputs:
         if item.name in study.inputs:
             spec = study.inputs[item.name]
-            scale = 1.0 / config.units.factor(spec.unit, item.unit)
+            scale = 1.0 / units.factor(spec.unit, item.unit)
             low, middle, high = np.quantile(runs[item.name] * scale, [0.05, 0.5, 0.95])
             shown = [spec.distribution, number(low), number(middle), number(high), unit(spec.unit)]
         else:
@@ -408,8 +410,7 @@ def _model_notes(model: Model) -> list[str]:
     if calibrated:
         lines.append(
             "Calibrated to the multibody rows of the case's tables (throw, WAD, HIC15, head dent): "
-            + ", ".join(f"{item.name} (nominal {quantity(item.nominal, item.unit)})"
-                        for item in calibrated)  # fmt: skip
+            + ", ".join(f"{i.name} (nominal {quantity(i.nominal, i.unit)})" for i in calibrated)
             + ". Every other output of the nominal run is a prediction."
         )
     return lines

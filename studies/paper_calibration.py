@@ -71,7 +71,9 @@ def inputs_of(x: Array) -> dict[str, float]:
 def misfit(x: Array) -> float:
     """Return the calibration's objective."""
     run = load_model("multibody").run(inputs_of(x))
-    score = sum(((v - PRIORS[n][0]) / PRIORS[n][1]) ** 2 for n, v in zip(NAMES[1:], x[1:], strict=True))
+    score = sum(
+        ((v - PRIORS[n][0]) / PRIORS[n][1]) ** 2 for n, v in zip(NAMES[1:], x[1:], strict=True)
+    )
     for name, (target, tolerance) in TARGETS.items():
         value = run.outputs[name]
         if not math.isfinite(value):

@@ -68,7 +68,8 @@ def _shadow(scene: SceneLike, frame: int, segment: int, axes: tuple[int, int]) -
     pick = np.ix_(axes, axes)
     values, vectors = np.linalg.eigh(shape[pick])
     ring = vectors @ (np.sqrt(np.maximum(values, 0.0))[:, None] * _CIRCLE)
-    return ring.T + scene.centre[frame, segment, list(axes)]
+    outline: Array = ring.T + scene.centre[frame, segment, list(axes)]
+    return outline
 
 
 def _draw_body(
@@ -187,8 +188,8 @@ def write_animation(scene: SceneLike, path: Path, *, frames: int = 120) -> None:
             above.set_ylim(right, left)
             above.set_xlabel("x along the road [m]")
             above.set_ylabel("y, left [m]")
-            canvas.draw()
-            image = np.asarray(canvas.buffer_rgba())[..., :3]
+            canvas.draw()  # type: ignore[no-untyped-call]
+            image = np.asarray(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]
             pictures.append(Image.fromarray(image).quantize(64))
     path.parent.mkdir(parents=True, exist_ok=True)
     pictures[0].save(

@@ -22,7 +22,7 @@ class Mark:
     kind: str
 
 
-_MARK_STYLE = {
+_MARK_STYLE: dict[str, dict[str, Any]] = {
     "observed": {"color": style.RED, "linestyle": "-"},
     "limit": {"color": "black", "linestyle": "--"},
     "simulated": {"color": style.GREEN, "linestyle": ":"},

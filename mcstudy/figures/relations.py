@@ -1,10 +1,12 @@
 """How outputs go with inputs and with each other."""
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 import seaborn as sns
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mcstudy.figures import style
@@ -20,7 +22,9 @@ def draw_correlations(correlations: pd.DataFrame, noise: float) -> Figure:
         inputs fall; such cells are printed grey.
     """
     with style.styled():
-        figure = style.new_figure(1.35 * len(correlations.columns) + 2.6, 0.36 * len(correlations) + 1.6)
+        figure = style.new_figure(
+            1.35 * len(correlations.columns) + 2.6, 0.36 * len(correlations) + 1.6
+        )
         axes = figure.subplots()
         named = correlations.rename(index=style.words, columns=style.words)
         sns.heatmap(
@@ -63,7 +67,9 @@ def draw_against_input(
             _band(axes, part[column].to_numpy(), part[name].to_numpy())
             for mark in marks.get(name, ()):
                 colour = {"observed": style.RED, "limit": "black"}.get(mark.kind, style.GREEN)
-                axes.axhline(mark.value, color=colour, linewidth=1.3, label=mark.label, linestyle="--")
+                axes.axhline(
+                    mark.value, color=colour, linewidth=1.3, label=mark.label, linestyle="--"
+                )
             top = float(np.quantile(part[name], 0.998))
             axes.set_ylim(top=1.25 * top)
             axes.set(xlabel=input_label, ylabel=style.label(name, unit))
@@ -71,17 +77,20 @@ def draw_against_input(
         return figure
 
 
-def _band(axes: object, x: np.ndarray, y: np.ndarray) -> None:
+def _band(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
     edges = np.quantile(x, np.linspace(0.0, 1.0, 13))
-    middle, low, centre, high = [], [], [], []
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    middle: list[float] = []
+    low: list[float] = []
+    centre: list[float] = []
+    high: list[float] = []
+    for a, b in pairwise(edges):
         inside = (x >= a) & (x <= b)
         if inside.sum() >= 10:
             middle.append(float(np.median(x[inside])))
             for into, p in ((low, 0.05), (centre, 0.5), (high, 0.95)):
                 into.append(float(np.quantile(y[inside], p)))
-    axes.plot(middle, centre, color=style.BLUE, label="running median")  # type: ignore[attr-defined]
-    axes.fill_between(  # type: ignore[attr-defined]
+    axes.plot(middle, centre, color=style.BLUE, label="running median")
+    axes.fill_between(
         middle, low, high, color=style.BLUE, alpha=0.18, linewidth=0, label="5 to 95 %"
     )
 
@@ -100,7 +109,13 @@ def draw_joint(
         axes = figure.subplots()
         part = runs[[first[0], second[0]]].dropna()
         axes.scatter(
-            part[first[0]], part[second[0]], s=7, color=style.SKY, alpha=0.5, linewidths=0, label="runs"
+            part[first[0]],
+            part[second[0]],
+            s=7,
+            color=style.SKY,
+            alpha=0.5,
+            linewidths=0,
+            label="runs",
         )
         if len(part) > 50:
             sns.kdeplot(
@@ -119,7 +134,9 @@ def draw_joint(
         return figure
 
 
-def draw_convergence(tables: Mapping[str, Sequence[Mapping[str, float]]], units: Mapping[str, str]) -> Figure:
+def draw_convergence(
+    tables: Mapping[str, Sequence[Mapping[str, float]]], units: Mapping[str, str]
+) -> Figure:
     """Return the medians over growing parts of the study."""
     with style.styled():
         figure = style.new_figure(4.4 * len(tables), 2.9)

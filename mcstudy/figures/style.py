@@ -4,9 +4,11 @@ import io
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import seaborn as sns
+from cycler import cycler
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -15,7 +17,7 @@ BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 SKY, PURPLE, YELLOW, GREY = "#56B4E9", "#CC79A7", "#F0E442", "#6B6B6B"
 PALETTE = (BLUE, ORANGE, GREEN, RED, SKY, PURPLE, "#000000", "#8C6D31")
 
-_RC = {
+_RC: dict[str, Any] = {
     "font.size": 10,
     "axes.titlesize": 11,
     "axes.labelsize": 10,
@@ -54,7 +56,8 @@ def words(name: str) -> str:
 @contextmanager
 def styled() -> Iterator[None]:
     """Draw in the project's style, leaving the user's own settings alone."""
-    with sns.axes_style("ticks"), mpl.rc_context({**_RC, "axes.prop_cycle": mpl.cycler(color=PALETTE)}):
+    settings: Any = {**_RC, "axes.prop_cycle": cycler(color=PALETTE)}
+    with sns.axes_style("ticks"), mpl.rc_context(settings):
         yield
 
 

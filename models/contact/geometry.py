@@ -18,7 +18,7 @@ TOLERANCE = 1e-5
 
 
 @inlined_kernel
-def shape_matrix(rotation, i, a2, b2, c2):  # type: ignore[no-untyped-def]
+def shape_matrix(rotation, i, a2, b2, c2):
     """Return the six entries of ``R diag(a2, b2, c2) R^T`` (m2) for ``rotation[i]``."""
     x0, x1, x2 = rotation[i, 0, 0], rotation[i, 0, 1], rotation[i, 0, 2]
     y0, y1, y2 = rotation[i, 1, 0], rotation[i, 1, 1], rotation[i, 1, 2]
@@ -34,7 +34,7 @@ def shape_matrix(rotation, i, a2, b2, c2):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def roll_direction(d1, d3, p11, p13, p33):  # type: ignore[no-untyped-def]
+def roll_direction(d1, d3, p11, p13, p33):
     """Return the separating direction (n1, n3) and separation from a point in the plane.
 
     The ellipsoid, projected along the roll's axis, is an ellipse with shape ``p`` (m2) and centre
@@ -67,7 +67,7 @@ def roll_direction(d1, d3, p11, p13, p33):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def ellipsoid_direction(dx, dy, dz, A, B, x, y, z):  # type: ignore[no-untyped-def]
+def ellipsoid_direction(dx, dy, dz, A, B, x, y, z):
     """Return the separating direction (nx, ny, nz) and separation of two ellipsoids.
 
     ``A`` and ``B`` are the six shape entries of the first and second ellipsoid (m2), ``d`` the
@@ -131,7 +131,7 @@ def ellipsoid_direction(dx, dy, dz, A, B, x, y, z):  # type: ignore[no-untyped-d
 
 
 @inlined_kernel
-def _quadratic(A, B, ha, hb, ux, uy, uz, vx, vy, vz):  # type: ignore[no-untyped-def]
+def _quadratic(A, B, ha, hb, ux, uy, uz, vx, vy, vz):
     a = (
         ux * (A[0] * vx + A[1] * vy + A[2] * vz)
         + uy * (A[1] * vx + A[3] * vy + A[4] * vz)

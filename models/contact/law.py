@@ -73,7 +73,7 @@ class ForceCurve:
 
 
 @kernel
-def combine_curves(surface_d, surface_f, surface_ratio, body_d, body_f, body_ratio, out):  # type: ignore[no-untyped-def]
+def combine_curves(surface_d, surface_f, surface_ratio, body_d, body_f, body_ratio, out):
     """Write the law of two curves in series into ``out`` (KNOTS, 4) and return its knot count.
 
     Columns: penetration (m), force (N), elastic recovery (m), penetration of the surface (m).
@@ -83,10 +83,8 @@ def combine_curves(surface_d, surface_f, surface_ratio, body_d, body_f, body_rat
     out[0, :] = 0.0
     while i < ns or j < nb:
         # Next knot: the smaller force of the two sides.
-        if j >= nb or (i < ns and surface_f[i] <= body_f[j]):
-            force = surface_f[i]
-        else:
-            force = body_f[j]
+        surface_next = j >= nb or (i < ns and surface_f[i] <= body_f[j])
+        force = surface_f[i] if surface_next else body_f[j]
         a, b = min(i, ns - 1), min(j, nb - 1)
         ds = surface_d[a - 1] + (force - surface_f[a - 1]) * (surface_d[a] - surface_d[a - 1]) / (
             surface_f[a] - surface_f[a - 1]
@@ -107,7 +105,7 @@ def combine_curves(surface_d, surface_f, surface_ratio, body_d, body_f, body_rat
 
 
 @inlined_kernel
-def interpolate_law(laws, law, count, column, penetration):  # type: ignore[no-untyped-def]
+def interpolate_law(laws, law, count, column, penetration):
     """Return a column of combined law ``law`` at ``penetration`` (m); the last slope goes on."""
     k = 1
     while k < count - 1 and penetration > laws[law, k, 0]:
@@ -118,7 +116,7 @@ def interpolate_law(laws, law, count, column, penetration):  # type: ignore[no-u
 
 
 @inlined_kernel
-def contact_force(laws, law, count, damping, onset, penetration, rate, largest):  # type: ignore[no-untyped-def]
+def contact_force(laws, law, count, damping, onset, penetration, rate, largest):
     """Return the elastic and the damping force (N) of a contact.
 
     Parameters

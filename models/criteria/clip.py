@@ -12,7 +12,7 @@ from models.compilation import kernel
 
 
 @kernel
-def _time_above(t, a, level, consecutive):  # type: ignore[no-untyped-def]
+def _time_above(t, a, level, consecutive):
     """Total, or longest single, time in s with the signal at or above ``level``."""
     total, run, longest = 0.0, 0.0, 0.0
     for i in range(t.size - 1):

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 @kernel
-def _value(area, length):  # type: ignore[no-untyped-def]
+def _value(area, length):
     if area <= 0.0 or length <= 0.0:
         return 0.0
     mean = area / length
@@ -32,14 +32,14 @@ def _value(area, length):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _area_at(t, a, s, i, x):  # type: ignore[no-untyped-def]
+def _area_at(t, a, s, i, x):
     """Integral from the start to time ``x`` inside cell ``i``."""
     u = x - t[i]
     return s[i] + u * (a[i] + 0.5 * u * (a[i + 1] - a[i]) / (t[i + 1] - t[i]))
 
 
 @kernel
-def _grid_maximum(t, a, s, window, peak):  # type: ignore[no-untyped-def]
+def _grid_maximum(t, a, s, window, peak):
     n = t.size
     limit = window * (1.0 + 1e-7)
     best, b1, b2 = 0.0, t[0], t[0]
@@ -58,7 +58,7 @@ def _grid_maximum(t, a, s, window, peak):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _free_pair(t, a, s, i, j, window, best):  # type: ignore[no-untyped-def]
+def _free_pair(t, a, s, i, j, window, best):
     """Best window with ends at one level inside cells ``i`` < ``j``; (0, 0, 0) if none."""
     si = (a[i + 1] - a[i]) / (t[i + 1] - t[i])
     sj = (a[j + 1] - a[j]) / (t[j + 1] - t[j])
@@ -105,7 +105,7 @@ def _free_pair(t, a, s, i, j, window, best):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _bound_window(t, a, s, window, best, b1, b2):  # type: ignore[no-untyped-def]
+def _bound_window(t, a, s, window, best, b1, b2):
     """Improve ``best`` over windows of the full length."""
     n = t.size
     i, j = 0, 0
@@ -139,7 +139,7 @@ def _bound_window(t, a, s, window, best, b1, b2):  # type: ignore[no-untyped-def
 
 
 @kernel
-def _open_end(t, a, s, window, best, b1, b2):  # type: ignore[no-untyped-def]
+def _open_end(t, a, s, window, best, b1, b2):
     """Improve ``best`` over windows that start with the record or end with it."""
     n = t.size
     for side in range(2):
@@ -177,7 +177,7 @@ def _open_end(t, a, s, window, best, b1, b2):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _continuous_maximum(t, a, s, window, peak):  # type: ignore[no-untyped-def]
+def _continuous_maximum(t, a, s, window, peak):
     n = t.size
     best, b1, b2 = _grid_maximum(t, a, s, window, peak)
     best, b1, b2 = _bound_window(t, a, s, window, best, b1, b2)
@@ -197,7 +197,9 @@ def _continuous_maximum(t, a, s, window, peak):  # type: ignore[no-untyped-def]
                 continue
             shortest = t[j] - t[i + 1]
             # area^2.5 / shortest^1.5 <= best, without dividing
-            if shortest > 0.0 and area * area * math.sqrt(area) <= best * shortest * math.sqrt(shortest):
+            if shortest > 0.0 and area * area * math.sqrt(area) <= best * shortest * math.sqrt(
+                shortest
+            ):
                 continue
             v, x1, x2 = _free_pair(t, a, s, i, j, window, best)
             if v > best:

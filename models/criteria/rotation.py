@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 CRITICAL_ANGULAR_VELOCITY = (66.25, 56.45, 42.87)
-"""rad/s about x, y, z: averages of the CSDM and MPS values (E. Takhounts et al., Stapp 57, 2013)."""
+"""rad/s about x, y, z: means of the CSDM and MPS values (E. Takhounts et al., Stapp 57, 2013)."""
 
 
 def brain_injury_criterion(angular_velocity: ArrayLike) -> float:

@@ -14,7 +14,7 @@ from models.multibody.rotation import rotate_quaternion
 
 
 @inlined_kernel
-def predict(motion, loads, old_spin, old_velocity, old_alpha, old_acceleration, h):  # type: ignore[no-untyped-def]
+def predict(motion, loads, old_spin, old_velocity, old_alpha, old_acceleration, h):
     """Advance positions by ``h`` seconds, keep the old rates, and predict the new ones."""
     n = motion.orientation.shape[0]
     half = 0.5 * h * h
@@ -38,7 +38,7 @@ def predict(motion, loads, old_spin, old_velocity, old_alpha, old_acceleration, 
 
 
 @inlined_kernel
-def correct(motion, loads, old_spin, old_velocity, old_alpha, old_acceleration, h):  # type: ignore[no-untyped-def]
+def correct(motion, loads, old_spin, old_velocity, old_alpha, old_acceleration, h):
     """Replace the predicted rates by the trapezoidal ones."""
     half = 0.5 * h
     for k in range(3):

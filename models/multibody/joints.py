@@ -81,7 +81,7 @@ class Joints(NamedTuple):
 
 
 @inlined_kernel
-def _component_torque(joints, i, k, phi):  # type: ignore[no-untyped-def]
+def _component_torque(joints, i, k, phi):
     rest = phi - joints.neutral[i, k]
     g = rest * (joints.stiffness_high[i, k] if rest > 0.0 else joints.stiffness_low[i, k])
     excess = abs(phi) - joints.half_range[i, k]
@@ -93,7 +93,7 @@ def _component_torque(joints, i, k, phi):  # type: ignore[no-untyped-def]
 
 
 @inlined_kernel
-def apply_joint_torques(tree, joints, motion, loads, power):  # type: ignore[no-untyped-def]
+def apply_joint_torques(tree, joints, motion, loads, power):
     """Write ``loads.joint_torque`` (world axes); add elastic and damping power (W) to ``power``.
 
     ``power[0]`` gets the elastic part, ``power[1]`` damping and friction.

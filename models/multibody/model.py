@@ -12,11 +12,11 @@ from models.multibody import outcome
 from models.multibody.setup import Crash, build_crash
 from models.multibody.simulation import (
     END_REASONS,
+    R_ZONES,
     S_FRAMES,
     S_REASON,
     S_RECORDS,
     SUMMARY,
-    R_ZONES,
     Settings,
     empty_scratch,
     simulate,
@@ -52,7 +52,9 @@ def _table() -> dict[str, object]:
 def _inputs() -> tuple[Input, ...]:
     rows = data.load("multibody.toml")["inputs"]
     return tuple(
-        Input(name, r["unit"], r["meaning"], r["nominal"], *r["range"], r["source"])
+        Input(
+            name, r["unit"], r["meaning"], r["nominal"], r["range"][0], r["range"][1], r["source"]
+        )
         for name, r in rows.items()
     )
 

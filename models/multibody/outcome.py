@@ -187,9 +187,7 @@ def histories(raw: Raw) -> dict[str, History]:
         zone.name: (sampled(R_ZONES + j), "N") for j, zone in enumerate(raw.crash.vehicle.zones)
     }
     contact["road"] = (sampled(R_ZONES + len(raw.crash.vehicle.zones)), "N")
-    centre = {
-        axis: (sampled(R_CENTRE + k), "m") for k, axis in enumerate(("x", "y", "z"))
-    }
+    centre = {axis: (sampled(R_CENTRE + k), "m") for k, axis in enumerate(("x", "y", "z"))}
     work = {name: (np.array([raw.work[k]]), "J") for k, name in enumerate(WORK_CHANNELS)}
     end = np.array([raw.summary[S_TIME]])
     return {

@@ -11,7 +11,7 @@ from models.compilation import inlined_kernel, kernel
 
 
 @kernel
-def quaternion_to_matrix(q, R):  # type: ignore[no-untyped-def]
+def quaternion_to_matrix(q, R):
     """Write the rotation matrix of the unit quaternion ``q`` (4,) into ``R`` (3, 3)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     R[0, 0] = 1.0 - 2.0 * (y * y + z * z)
@@ -26,8 +26,8 @@ def quaternion_to_matrix(q, R):  # type: ignore[no-untyped-def]
 
 
 @inlined_kernel
-def rotate_quaternion(q, i, ax, ay, az):  # type: ignore[no-untyped-def]
-    """Turn row ``i`` of ``q`` (n, 4) in place by the world rotation vector ``(ax, ay, az)`` in rad."""
+def rotate_quaternion(q, i, ax, ay, az):
+    """Turn row ``i`` of ``q`` (n, 4) in place by a world rotation vector in rad."""
     square = ax * ax + ay * ay + az * az
     # sin(t/2)/t and cos(t/2) by series: a step turns a segment by far less than 0.1 rad,
     # where the first dropped term is below 1e-16.

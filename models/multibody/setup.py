@@ -10,7 +10,13 @@ from models.compilation import kernel
 from models.contact.geometry import ellipsoid_direction, shape_matrix
 from models.contact.law import KNOTS, ForceCurve, combine_curves
 from models.multibody.joints import Joints
-from models.multibody.surfaces import Ellipsoids, Zones, empty_contacts, update_centres, zone_separation
+from models.multibody.surfaces import (
+    Ellipsoids,
+    Zones,
+    empty_contacts,
+    update_centres,
+    zone_separation,
+)
 from models.multibody.tree import Motion, Tree, empty_motion, update_kinematics
 from models.pedestrian.anthropometry import PARENTS, SEGMENTS, Body, build_body, region_of
 from models.pedestrian.joints import build_joints
@@ -70,7 +76,7 @@ def place(posture: Posture) -> Motion:
 
 
 @kernel
-def pair_separations(tree, ellipsoids, motion, contacts, out):  # type: ignore[no-untyped-def]
+def pair_separations(tree, ellipsoids, motion, contacts, out):
     """Write the separation (m) of every self-contact pair."""
     update_kinematics(tree, motion)
     update_centres(ellipsoids, motion, contacts)
@@ -92,7 +98,7 @@ def pair_separations(tree, ellipsoids, motion, contacts, out):  # type: ignore[n
 
 
 @kernel
-def _touches(zones, ellipsoids, motion, contacts, shift):  # type: ignore[no-untyped-def]
+def _touches(zones, ellipsoids, motion, contacts, shift):
     for i in range(ellipsoids.reach.shape[0]):
         x, y, z = contacts.centre[i, 0] + shift, contacts.centre[i, 1], contacts.centre[i, 2]
         for j in range(zones.radius.shape[0]):
@@ -103,7 +109,7 @@ def _touches(zones, ellipsoids, motion, contacts, shift):  # type: ignore[no-unt
 
 
 @kernel
-def first_contact_shift(tree, zones, ellipsoids, motion, contacts, ahead, behind):  # type: ignore[no-untyped-def]
+def first_contact_shift(tree, zones, ellipsoids, motion, contacts, ahead, behind):
     """Return the shift in x (m) that makes the body just touch the car, or NaN."""
     update_kinematics(tree, motion)
     update_centres(ellipsoids, motion, contacts)
@@ -123,7 +129,9 @@ def first_contact_shift(tree, zones, ellipsoids, motion, contacts, ahead, behind
 
 
 @kernel
-def _combine_all(surface_d, surface_f, surface_n, surface_r, body_d, body_f, body_n, body_r, laws, counts):  # type: ignore[no-untyped-def]
+def _combine_all(
+    surface_d, surface_f, surface_n, surface_r, body_d, body_f, body_n, body_r, laws, counts
+):
     bodies = body_n.shape[0]
     for j in range(surface_n.shape[0]):
         for i in range(bodies):
@@ -195,9 +203,7 @@ def build_crash(inputs: dict[str, float], vehicle: Vehicle) -> Crash | None:
         By name, in SI units; see ``data/multibody.toml``.
     vehicle : Vehicle
     """
-    body = build_body(
-        inputs["age"], inputs["stature"], inputs["body_mass"], inputs["head_mass"]
-    )
+    body = build_body(inputs["age"], inputs["stature"], inputs["body_mass"], inputs["head_mass"])
     tree = build_tree(body)
     joints = build_joints(
         body, neck_stiffness=inputs["neck_stiffness"], muscle_tone=inputs["muscle_tone"]

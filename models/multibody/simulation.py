@@ -141,13 +141,15 @@ def stable_ticks(tree: Tree, joints: Joints, tick: float, wanted: int) -> int:
     for i in range(1, n):
         parent = tree.parent[i]
         total[parent] += damping[i]
-        inertia[parent, :2] += tree.mass[i] * float(tree.joint_in_parent[i] @ tree.joint_in_parent[i])
+        inertia[parent, :2] += tree.mass[i] * float(
+            tree.joint_in_parent[i] @ tree.joint_in_parent[i]
+        )
     rate = float((total / inertia)[1:].max())
     return min(wanted, max(1, int(0.5 / (rate * tick))))
 
 
 @inlined_kernel
-def total_energy(tree, motion, gravity):  # type: ignore[no-untyped-def]
+def total_energy(tree, motion, gravity):
     """Return kinetic plus gravitational energy (J) of the tree."""
     energy = 0.0
     for i in range(tree.mass.shape[0]):
@@ -165,7 +167,7 @@ def total_energy(tree, motion, gravity):  # type: ignore[no-untyped-def]
 
 
 @inlined_kernel
-def evaluate(tree, joints, ellipsoids, zones, car, motion, loads, contacts, gravity, power):  # type: ignore[no-untyped-def]
+def evaluate(tree, joints, ellipsoids, zones, car, motion, loads, contacts, gravity, power):
     """Fill loads and accelerations for the present state; write the powers (W) of all channels."""
     for k in range(CHANNELS):
         power[k] = 0.0
@@ -188,7 +190,7 @@ def evaluate(tree, joints, ellipsoids, zones, car, motion, loads, contacts, grav
 
 
 @inlined_kernel
-def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts):  # type: ignore[no-untyped-def]
+def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts):
     """Return how many ticks the next step may take.
 
     One while the head is fast near the car or meets the road; the settings say how many in free
@@ -215,9 +217,9 @@ def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts):  # 
             return 1
     road = contacts.zone_force.shape[0] - 1
     fall = -motion.velocity[head, 2]
-    if (z - reach < 2.0 * settings.flight * settings.tick * fall + 1e-3 and abs(fall) > HEAD_FALL) or (
-        contacts.segment_force[head, road] > HEAD_FORCE
-    ):
+    if (
+        z - reach < 2.0 * settings.flight * settings.tick * fall + 1e-3 and abs(fall) > HEAD_FALL
+    ) or (contacts.segment_force[head, road] > HEAD_FORCE):
         return 1
     for j in range(road + 1):
         if contacts.zone_force[j] > 0.0:
@@ -230,7 +232,7 @@ def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts):  # 
 
 
 @inlined_kernel
-def _write_record(row, time, head, tree, motion, loads, contacts, car, record):  # type: ignore[no-untyped-def]
+def _write_record(row, time, head, tree, motion, loads, contacts, car, record):
     record[row, R_TIME] = time
     ax, ay, az = centre_acceleration(motion, loads, head)
     record[row, R_ACCELERATION] = ax
@@ -270,7 +272,7 @@ def _write_record(row, time, head, tree, motion, loads, contacts, car, record): 
 
 
 @inlined_kernel
-def _write_frame(row, time, motion, contacts, car, frames):  # type: ignore[no-untyped-def]
+def _write_frame(row, time, motion, contacts, car, frames):
     n = motion.orientation.shape[0]
     frames[row, 0] = time
     frames[row, 1], frames[row, 2], frames[row, 3] = car[0], car[1], car[2]
@@ -282,7 +284,7 @@ def _write_frame(row, time, motion, contacts, car, frames):  # type: ignore[no-u
 
 
 @inlined_kernel
-def _speeds(tree, motion):  # type: ignore[no-untyped-def]
+def _speeds(tree, motion):
     """Return the speed of the centre of gravity and the root mean square segment speed."""
     total, square = 0.0, 0.0
     px, py, pz = 0.0, 0.0, 0.0
@@ -301,7 +303,7 @@ def _speeds(tree, motion):  # type: ignore[no-untyped-def]
 def simulate(
     tree, joints, ellipsoids, zones, car_motion, settings,
     motion, loads, contacts, scratch, work, record, frames, head_contact, summary,
-):  # type: ignore[no-untyped-def]  # fmt: skip
+):  # fmt: skip
     """Run from the present state to rest.
 
     Parameters

@@ -30,6 +30,10 @@ ARC_BORDER = 0.15
 """Angle (rad) over which a roll fades at the ends of its arc (assumed)."""
 MAXIMUM_DEPTH = 0.30
 """Depth (m) below a panel beyond which a segment counts as under the car, not in it (assumed)."""
+ENTRY_DEPTH = 0.03
+"""Depth (m) within which a segment must first be seen by a zone; deeper, it came past the border
+(beside the fender, from under the bumper) and is not in contact (assumed, ten times the way of a
+step)."""
 SLIP_VELOCITY = 0.1
 """Slip (m/s) at which Coulomb friction reaches 71 % of its bound (regularisation, assumed)."""
 SLIP_RATE = 1000.0
@@ -119,6 +123,7 @@ class Contacts(NamedTuple):
     ----------
     largest : (n, z + 1) m, largest penetration so far. pair_largest : (p,) m.
     pair_normal : (p, 3) last separating direction of a pair.
+    engaged : (n, z) whether a segment entered a zone through its surface and is still in it.
     zone_force : (z + 1,) N, sum over segments of the normal force at this instant.
     segment_force : (n, z + 1) N, normal force at this instant.
     point : (n, z, 3) m, contact point in the car's frame at this instant.
@@ -129,6 +134,7 @@ class Contacts(NamedTuple):
     largest: Array
     pair_largest: Array
     pair_normal: Array
+    engaged: NDArray[np.bool_]
     zone_force: Array
     segment_force: Array
     point: Array
@@ -139,18 +145,25 @@ class Contacts(NamedTuple):
 def empty_contacts(n: int, z: int, p: int) -> Contacts:
     """Return the state of an untouched set of contacts."""
     return Contacts(
-        np.zeros((n, z + 1)), np.zeros(p), np.zeros((p, 3)), np.zeros(z + 1), np.zeros((n, z + 1)), np.zeros((n, z, 3)),
-        np.zeros((n, z, 3)), np.zeros((n, 3)),
-    )  # fmt: skip
+        largest=np.zeros((n, z + 1)),
+        pair_largest=np.zeros(p),
+        pair_normal=np.zeros((p, 3)),
+        engaged=np.zeros((n, z), dtype=np.bool_),
+        zone_force=np.zeros(z + 1),
+        segment_force=np.zeros((n, z + 1)),
+        point=np.zeros((n, z, 3)),
+        normal=np.zeros((n, z, 3)),
+        centre=np.zeros((n, 3)),
+    )
 
 
 @inlined_kernel
-def _fade(x, border):  # type: ignore[no-untyped-def]
+def _fade(x, border):
     return min(max(x / border + 0.5, 0.0), 1.0)
 
 
 @inlined_kernel
-def _push(motion, loads, i, px, py, pz, fx, fy, fz):  # type: ignore[no-untyped-def]
+def _push(motion, loads, i, px, py, pz, fx, fy, fz):
     """Add a force at a world point to segment ``i``."""
     rx, ry, rz = px - motion.centre[i, 0], py - motion.centre[i, 1], pz - motion.centre[i, 2]
     loads.force[i, 0] += fx
@@ -162,7 +175,7 @@ def _push(motion, loads, i, px, py, pz, fx, fy, fz):  # type: ignore[no-untyped-
 
 
 @inlined_kernel
-def _point_velocity(motion, i, px, py, pz):  # type: ignore[no-untyped-def]
+def _point_velocity(motion, i, px, py, pz):
     rx, ry, rz = px - motion.centre[i, 0], py - motion.centre[i, 1], pz - motion.centre[i, 2]
     wx = motion.angular_velocity[i, 0]
     wy = motion.angular_velocity[i, 1]
@@ -175,13 +188,13 @@ def _point_velocity(motion, i, px, py, pz):  # type: ignore[no-untyped-def]
 
 
 @inlined_kernel
-def _friction_coefficient(mu, normal, slip_square, mass):  # type: ignore[no-untyped-def]
+def _friction_coefficient(mu, normal, slip_square, mass):
     c = mu * normal / math.sqrt(slip_square + SLIP_VELOCITY * SLIP_VELOCITY)
     return min(c, SLIP_RATE * mass)
 
 
 @inlined_kernel
-def update_centres(ellipsoids, motion, contacts):  # type: ignore[no-untyped-def]
+def update_centres(ellipsoids, motion, contacts):
     """Fill the ellipsoid centres in world axes."""
     for i in range(motion.centre.shape[0]):
         x, y, z = ellipsoids.offset[i, 0], ellipsoids.offset[i, 1], ellipsoids.offset[i, 2]
@@ -195,7 +208,7 @@ def update_centres(ellipsoids, motion, contacts):  # type: ignore[no-untyped-def
 
 
 @inlined_kernel
-def zone_separation(zones, ellipsoids, motion, j, i, cx, cy, cz, cosine, sine):  # type: ignore[no-untyped-def]
+def zone_separation(zones, ellipsoids, motion, j, i, cx, cy, cz, cosine, sine):
     """Return separation, normal, contact point (car frame) and border weight.
 
     Parameters
@@ -255,8 +268,8 @@ def zone_separation(zones, ellipsoids, motion, j, i, cx, cy, cz, cosine, sine): 
         n1, n3, separation = roll_direction(d1, d3, p11, p13, p33)
         separation -= zones.radius[j]
     else:
-        separation = n1 * d1 + n3 * d3 - math.sqrt(
-            p11 * n1 * n1 + 2.0 * p13 * n1 * n3 + p33 * n3 * n3
+        separation = (
+            n1 * d1 + n3 * d3 - math.sqrt(p11 * n1 * n1 + 2.0 * p13 * n1 * n3 + p33 * n3 * n3)
         )
     # Deepest point of the ellipsoid: centre - A n / h, in car axes.
     nwx, nwy = n1 * gx, n1 * gy
@@ -283,7 +296,7 @@ def zone_separation(zones, ellipsoids, motion, j, i, cx, cy, cz, cosine, sine): 
 
 
 @inlined_kernel
-def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, power):  # type: ignore[no-untyped-def]
+def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, power):
     """Add the loads of the car on all segments.
 
     ``car`` is (6,): x, y of the frame's origin (m), yaw (rad) and their rates; see
@@ -298,9 +311,9 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
         reach = ellipsoids.reach[i]
         for j in range(count):
             contacts.segment_force[i, j] = 0.0
-        if cx > reach:
-            continue
         for j in range(count):
+            engaged = contacts.engaged[i, j]
+            contacts.engaged[i, j] = False
             if (
                 cx > zones.box[j, 1] + reach
                 or cx < zones.box[j, 0] - reach
@@ -314,6 +327,9 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
             if separation >= 0.0 or weight == 0.0:
                 continue
             penetration = -separation
+            if not engaged and penetration > ENTRY_DEPTH:
+                continue
+            contacts.engaged[i, j] = True
             if penetration > contacts.largest[i, j]:
                 contacts.largest[i, j] = penetration
             # World point, normal and relative velocity.
@@ -363,7 +379,7 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
 
 
 @inlined_kernel
-def apply_road_contacts(zones, ellipsoids, motion, loads, contacts, tree, power):  # type: ignore[no-untyped-def]
+def apply_road_contacts(zones, ellipsoids, motion, loads, contacts, tree, power):
     """Add the loads of the road, the plane z = 0, on all segments."""
     road = zones.radius.shape[0]
     mu = zones.friction[road]
@@ -386,12 +402,24 @@ def apply_road_contacts(zones, ellipsoids, motion, loads, contacts, tree, power)
             continue
         if penetration > contacts.largest[i, road]:
             contacts.largest[i, road] = penetration
-        px = contacts.centre[i, 0] - (
-            motion.rotation[i, 0, 0] * a + motion.rotation[i, 0, 1] * b + motion.rotation[i, 0, 2] * c
-        ) / h
-        py = contacts.centre[i, 1] - (
-            motion.rotation[i, 1, 0] * a + motion.rotation[i, 1, 1] * b + motion.rotation[i, 1, 2] * c
-        ) / h
+        px = (
+            contacts.centre[i, 0]
+            - (
+                motion.rotation[i, 0, 0] * a
+                + motion.rotation[i, 0, 1] * b
+                + motion.rotation[i, 0, 2] * c
+            )
+            / h
+        )
+        py = (
+            contacts.centre[i, 1]
+            - (
+                motion.rotation[i, 1, 0] * a
+                + motion.rotation[i, 1, 1] * b
+                + motion.rotation[i, 1, 2] * c
+            )
+            / h
+        )
         pz = contacts.centre[i, 2] - h
         vx, vy, vz = _point_velocity(motion, i, px, py, pz)
         law = ellipsoids.surface_law[i, road]
@@ -417,7 +445,7 @@ def apply_road_contacts(zones, ellipsoids, motion, loads, contacts, tree, power)
 
 
 @inlined_kernel
-def apply_self_contacts(ellipsoids, motion, loads, contacts, tree, power):  # type: ignore[no-untyped-def]
+def apply_self_contacts(ellipsoids, motion, loads, contacts, tree, power):
     """Add the loads between segments (head and arms against the trunk, leg against leg)."""
     for k in range(ellipsoids.pairs.shape[0]):
         i, j = ellipsoids.pairs[k, 0], ellipsoids.pairs[k, 1]
@@ -496,7 +524,7 @@ def apply_self_contacts(ellipsoids, motion, loads, contacts, tree, power):  # ty
 
 
 @inlined_kernel
-def _form(A, x, y, z):  # type: ignore[no-untyped-def]
+def _form(A, x, y, z):
     return (
         A[0] * x * x
         + A[3] * y * y

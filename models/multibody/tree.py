@@ -121,7 +121,7 @@ def empty_loads(n: int) -> Loads:
 
 
 @inlined_kernel
-def update_kinematics(tree, motion):  # type: ignore[no-untyped-def]
+def update_kinematics(tree, motion):
     """Fill rotations, centres, joints and centre velocities from the generalised state."""
     n = tree.mass.shape[0]
     for i in range(n):
@@ -155,9 +155,21 @@ def update_kinematics(tree, motion):  # type: ignore[no-untyped-def]
             a0 = tree.joint_in_parent[i, 0]
             a1 = tree.joint_in_parent[i, 1]
             a2 = tree.joint_in_parent[i, 2]
-            dx = motion.rotation[p, 0, 0] * a0 + motion.rotation[p, 0, 1] * a1 + motion.rotation[p, 0, 2] * a2
-            dy = motion.rotation[p, 1, 0] * a0 + motion.rotation[p, 1, 1] * a1 + motion.rotation[p, 1, 2] * a2
-            dz = motion.rotation[p, 2, 0] * a0 + motion.rotation[p, 2, 1] * a1 + motion.rotation[p, 2, 2] * a2
+            dx = (
+                motion.rotation[p, 0, 0] * a0
+                + motion.rotation[p, 0, 1] * a1
+                + motion.rotation[p, 0, 2] * a2
+            )
+            dy = (
+                motion.rotation[p, 1, 0] * a0
+                + motion.rotation[p, 1, 1] * a1
+                + motion.rotation[p, 1, 2] * a2
+            )
+            dz = (
+                motion.rotation[p, 2, 0] * a0
+                + motion.rotation[p, 2, 1] * a1
+                + motion.rotation[p, 2, 2] * a2
+            )
             ux = motion.angular_velocity[p, 0]
             uy = motion.angular_velocity[p, 1]
             uz = motion.angular_velocity[p, 2]
@@ -184,14 +196,14 @@ def update_kinematics(tree, motion):  # type: ignore[no-untyped-def]
 
 
 @inlined_kernel
-def solve_accelerations(tree, motion, loads):  # type: ignore[no-untyped-def]
+def solve_accelerations(tree, motion, loads):
     """Fill ``joint_acceleration`` and ``angular_acceleration`` from loads and motion."""
     _sweep_to_root(tree, motion, loads)
     _sweep_to_leaves(tree, motion, loads)
 
 
 @inlined_kernel
-def _sweep_to_root(tree, motion, loads):  # type: ignore[no-untyped-def]
+def _sweep_to_root(tree, motion, loads):
     n = tree.mass.shape[0]
     loads.gathered[:] = 0.0
     for i in range(n - 1, -1, -1):
@@ -230,9 +242,21 @@ def _sweep_to_root(tree, motion, loads):  # type: ignore[no-untyped-def]
         # M (symmetric), K (full), G (symmetric), children included.
         M00, M01, M02 = m + loads.gathered[i, 0], loads.gathered[i, 1], loads.gathered[i, 2]
         M11, M12, M22 = m + loads.gathered[i, 3], loads.gathered[i, 4], m + loads.gathered[i, 5]
-        K00, K01, K02 = loads.gathered[i, 6], loads.gathered[i, 7] - m * rz, loads.gathered[i, 8] + m * ry
-        K10, K11, K12 = loads.gathered[i, 9] + m * rz, loads.gathered[i, 10], loads.gathered[i, 11] - m * rx
-        K20, K21, K22 = loads.gathered[i, 12] - m * ry, loads.gathered[i, 13] + m * rx, loads.gathered[i, 14]
+        K00, K01, K02 = (
+            loads.gathered[i, 6],
+            loads.gathered[i, 7] - m * rz,
+            loads.gathered[i, 8] + m * ry,
+        )
+        K10, K11, K12 = (
+            loads.gathered[i, 9] + m * rz,
+            loads.gathered[i, 10],
+            loads.gathered[i, 11] - m * rx,
+        )
+        K20, K21, K22 = (
+            loads.gathered[i, 12] - m * ry,
+            loads.gathered[i, 13] + m * rx,
+            loads.gathered[i, 14],
+        )
         G00 = Ixx + m * (ry * ry + rz * rz) + loads.gathered[i, 15]
         G01 = Ixy - m * rx * ry + loads.gathered[i, 16]
         G02 = Ixz - m * rx * rz + loads.gathered[i, 17]
@@ -262,7 +286,11 @@ def _sweep_to_root(tree, motion, loads):  # type: ignore[no-untyped-def]
         loads.gain[i, 2, 0], loads.gain[i, 2, 1], loads.gain[i, 2, 2] = X20, X21, X22
         parent = tree.parent[i]
         if parent >= 0:
-            tx, ty, tz = loads.joint_torque[i, 0], loads.joint_torque[i, 1], loads.joint_torque[i, 2]
+            tx, ty, tz = (
+                loads.joint_torque[i, 0],
+                loads.joint_torque[i, 1],
+                loads.joint_torque[i, 2],
+            )
         else:
             tx, ty, tz = 0.0, 0.0, 0.0
         nx, ny, nz = tx - sx, ty - sy, tz - sz
@@ -336,7 +364,7 @@ def _sweep_to_root(tree, motion, loads):  # type: ignore[no-untyped-def]
 
 
 @inlined_kernel
-def _sweep_to_leaves(tree, motion, loads):  # type: ignore[no-untyped-def]
+def _sweep_to_leaves(tree, motion, loads):
     n = tree.mass.shape[0]
     for i in range(n):
         p = tree.parent[i]
@@ -350,25 +378,40 @@ def _sweep_to_leaves(tree, motion, loads):  # type: ignore[no-untyped-def]
             qz = loads.angular_acceleration[p, 2]
             ud = ux * dx + uy * dy + uz * dz
             uu = ux * ux + uy * uy + uz * uz
-            loads.joint_acceleration[i, 0] = loads.joint_acceleration[p, 0] + qy * dz - qz * dy + ux * ud - dx * uu
-            loads.joint_acceleration[i, 1] = loads.joint_acceleration[p, 1] + qz * dx - qx * dz + uy * ud - dy * uu
-            loads.joint_acceleration[i, 2] = loads.joint_acceleration[p, 2] + qx * dy - qy * dx + uz * ud - dz * uu
+            loads.joint_acceleration[i, 0] = (
+                loads.joint_acceleration[p, 0] + qy * dz - qz * dy + ux * ud - dx * uu
+            )
+            loads.joint_acceleration[i, 1] = (
+                loads.joint_acceleration[p, 1] + qz * dx - qx * dz + uy * ud - dy * uu
+            )
+            loads.joint_acceleration[i, 2] = (
+                loads.joint_acceleration[p, 2] + qx * dy - qy * dx + uz * ud - dz * uu
+            )
         ax = loads.joint_acceleration[i, 0]
         ay = loads.joint_acceleration[i, 1]
         az = loads.joint_acceleration[i, 2]
         loads.angular_acceleration[i, 0] = (
-            loads.free_spin[i, 0] + loads.gain[i, 0, 0] * ax + loads.gain[i, 1, 0] * ay + loads.gain[i, 2, 0] * az
+            loads.free_spin[i, 0]
+            + loads.gain[i, 0, 0] * ax
+            + loads.gain[i, 1, 0] * ay
+            + loads.gain[i, 2, 0] * az
         )
         loads.angular_acceleration[i, 1] = (
-            loads.free_spin[i, 1] + loads.gain[i, 0, 1] * ax + loads.gain[i, 1, 1] * ay + loads.gain[i, 2, 1] * az
+            loads.free_spin[i, 1]
+            + loads.gain[i, 0, 1] * ax
+            + loads.gain[i, 1, 1] * ay
+            + loads.gain[i, 2, 1] * az
         )
         loads.angular_acceleration[i, 2] = (
-            loads.free_spin[i, 2] + loads.gain[i, 0, 2] * ax + loads.gain[i, 1, 2] * ay + loads.gain[i, 2, 2] * az
+            loads.free_spin[i, 2]
+            + loads.gain[i, 0, 2] * ax
+            + loads.gain[i, 1, 2] * ay
+            + loads.gain[i, 2, 2] * az
         )
 
 
 @inlined_kernel
-def centre_acceleration(motion, loads, i):  # type: ignore[no-untyped-def]
+def centre_acceleration(motion, loads, i):
     """Return the acceleration (x, y, z) in m/s2 of the centre of mass of segment ``i``."""
     rx, ry, rz = motion.offset[i, 0], motion.offset[i, 1], motion.offset[i, 2]
     wx = motion.angular_velocity[i, 0]

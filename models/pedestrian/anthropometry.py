@@ -37,8 +37,8 @@ SEGMENTS = (
 PARENTS = (-1, 0, 1, 2, 3, 2, 5, 2, 7, 0, 9, 10, 0, 12, 13)
 HEAD = SEGMENTS.index("head")
 HEAD_INERTIA_FACTOR = 1.15
-"""A skull carries its mass further out than a homogeneous ellipsoid: the data sheet allows 15 % more
-for the head [estimated]; adult heads measure 0.020 to 0.024 kg m2 against the ellipsoid's 0.021."""
+"""A skull carries its mass further out than a homogeneous ellipsoid: the data sheet allows 15 %
+more for the head [estimated]."""
 TRUNK = tuple(SEGMENTS.index(name) for name in ("hip", "abdomen", "chest"))
 
 

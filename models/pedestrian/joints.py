@@ -11,9 +11,7 @@ from models.pedestrian.scaling import scale_between
 NECK_JOINTS = ("neck", "head")
 
 
-def build_joints(
-    body: Body, *, neck_stiffness: float = 1.0, muscle_tone: float = 1.0
-) -> Joints:
+def build_joints(body: Body, *, neck_stiffness: float = 1.0, muscle_tone: float = 1.0) -> Joints:
     """Return the resistance of the 14 joints of a body.
 
     Parameters

@@ -43,7 +43,7 @@ def stopping_distance(motion: CarMotion) -> float:
 
 
 @inlined_kernel
-def car_state(motion, time, car):  # type: ignore[no-untyped-def]
+def car_state(motion, time, car):
     """Write origin x, y (m), yaw (rad), their rates (m/s, m/s, rad/s) into ``car`` (6,)."""
     stop = motion.speed / motion.deceleration
     t = min(time, stop)

@@ -66,16 +66,13 @@ def mujoco_twin(tree: Tree) -> tuple[Any, Any]:
             f'diaginertia="{numbers(tree.inertia[i])}"/>{children}</body>'
         )
 
-    xml = (
-        '<mujoco><option timestep="1e-4"/>'
-        f"<worldbody>{body(0)}</worldbody></mujoco>"
-    )
+    xml = f'<mujoco><option timestep="1e-4"/><worldbody>{body(0)}</worldbody></mujoco>'
     model = mujoco.MjModel.from_xml_string(xml)
     return model, mujoco.MjData(model)
 
 
 @kernel
-def free_steps(tree, motion, loads, scratch, h, n):  # type: ignore[no-untyped-def]
+def free_steps(tree, motion, loads, scratch, h, n):
     for _ in range(n):
         predict(
             motion, loads, scratch.old_spin, scratch.old_velocity, scratch.old_alpha,

@@ -129,9 +129,7 @@ def test_too_many_failures_stop_the_study(tmp_path: Path) -> None:
 def test_every_design_runs(tmp_path: Path) -> None:
     for method, size in (("monte-carlo", ""), ("sobol", "replicate_size = 4")):
         text = SMALL.replace('method = "latin-hypercube"', f'method = "{method}"')
-        lines = [
-            size if line.startswith("replicate_size") else line for line in text.splitlines()
-        ]
+        lines = [size if line.startswith("replicate_size") else line for line in text.splitlines()]
         text = "\n".join(lines).replace("n = 24", "n = 8")
         results = ResultsFolder(tmp_path / method)
         analysis = run_monte_carlo(load(text), text, results, workers=2, quiet=True)

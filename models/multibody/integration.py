@@ -10,7 +10,7 @@ For forces of position alone it is symplectic; damping is stable while its rate 
 """
 
 from models.compilation import inlined_kernel
-from models.multibody.rotation import rotate_quaternion
+from models.rotation import rotate_quaternion
 
 
 @inlined_kernel

@@ -15,14 +15,10 @@ angular velocity; friction (dummy joint setting, muscle tone) opposes it with a 
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from models.compilation import inlined_kernel
-
-Array = NDArray[np.float64]
 
 FRICTION_RATE = 3.0
 """Relative angular velocity (rad/s) at which joint friction reaches 71 % of its bound (assumed)."""
@@ -51,33 +47,6 @@ def _logarithm_polynomials() -> tuple[tuple[float, ...], tuple[float, ...]]:
 
 
 LOG_SCALE, LOG_CURVATURE = _logarithm_polynomials()
-
-
-class Joints(NamedTuple):
-    """Joint data of ``n`` segments (row 0, the root, is not used).
-
-    Attributes
-    ----------
-    centre : (n, 4) quaternion of the child relative to its parent at the centre of the range.
-    half_range : (n, 3) rad, half width of the range.
-    neutral : (n, 3) rad, where the passive stiffness is at rest, from the centre.
-    stiffness_low, stiffness_high : (n, 3) N m/rad, passive, on either side of the neutral value.
-    stop_low, stop_high : (n, 3) N m/rad, beyond the range.
-    damping : (n, 3) N m s/rad.
-    friction : (n,) N m.
-    onset : (n,) rad, over which the stops fade in.
-    """
-
-    centre: Array
-    half_range: Array
-    neutral: Array
-    stiffness_low: Array
-    stiffness_high: Array
-    stop_low: Array
-    stop_high: Array
-    damping: Array
-    friction: Array
-    onset: Array
 
 
 @inlined_kernel

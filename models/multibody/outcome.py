@@ -34,11 +34,12 @@ from models.multibody.simulation import (
     S_HEAD_ZONE,
     S_TIME,
 )
-from models.multibody.surfaces import ROLL, WORK_CHANNELS
+from models.multibody.surfaces import WORK_CHANNELS
 from models.pedestrian.anthropometry import HEAD, SEGMENTS
 from models.protocol import History, Scene
 from models.vehicle.motion import stopping_distance
 from models.vehicle.profile import hood_edge_distance, static_point, wrap_around_distance
+from models.vehicle.zones import ROLL
 
 Array = NDArray[np.float64]
 

@@ -9,21 +9,16 @@ from models import data
 from models.compilation import kernel
 from models.contact.geometry import ellipsoid_direction, shape_matrix
 from models.contact.law import KNOTS, ForceCurve, combine_curves
-from models.multibody.joints import Joints
-from models.multibody.surfaces import (
-    Ellipsoids,
-    Zones,
-    empty_contacts,
-    update_centres,
-    zone_separation,
-)
+from models.multibody.car_contact import zone_separation
+from models.multibody.surfaces import Ellipsoids, empty_contacts, update_centres
 from models.multibody.tree import Motion, Tree, empty_motion, update_kinematics
 from models.pedestrian.anthropometry import PARENTS, SEGMENTS, Body, build_body, region_of
-from models.pedestrian.joints import build_joints
+from models.pedestrian.joints import Joints, build_joints
 from models.pedestrian.posture import Posture, running_posture, standing_posture
 from models.pedestrian.tissue import build_tissue, self_contact_pairs
 from models.vehicle.motion import CarMotion, braking_motion
 from models.vehicle.profile import Vehicle, build_zones
+from models.vehicle.zones import Zones
 
 Array = NDArray[np.float64]
 

@@ -8,26 +8,18 @@ from numpy.typing import NDArray
 
 from models.compilation import inlined_kernel, kernel
 from models.criteria.units import STANDARD_GRAVITY
+from models.multibody.body_contact import apply_road_contacts, apply_self_contacts
+from models.multibody.car_contact import apply_car_contacts
 from models.multibody.integration import correct, predict
-from models.multibody.joints import (
-    FRICTION_RATE,
-    TWIST_FRICTION,
-    Joints,
-    apply_joint_torques,
-)
-from models.multibody.surfaces import (
-    CHANNELS,
-    apply_car_contacts,
-    apply_road_contacts,
-    apply_self_contacts,
-    update_centres,
-)
+from models.multibody.joints import FRICTION_RATE, TWIST_FRICTION, apply_joint_torques
+from models.multibody.surfaces import CHANNELS, update_centres
 from models.multibody.tree import (
     Tree,
     centre_acceleration,
     solve_accelerations,
     update_kinematics,
 )
+from models.pedestrian.joints import Joints
 from models.vehicle.motion import car_state
 
 Array = NDArray[np.float64]

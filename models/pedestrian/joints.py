@@ -1,14 +1,45 @@
 """Joint resistance of a pedestrian, scaled from the 7-year-old reference."""
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from models import data
-from models.multibody.joints import Joints
-from models.multibody.rotation import axis_rotation, multiply
 from models.pedestrian.anthropometry import SEGMENTS, Body, region_of
 from models.pedestrian.scaling import scale_between
+from models.rotation import axis_rotation, multiply
+
+Array = NDArray[np.float64]
 
 NECK_JOINTS = ("neck", "head")
+
+
+class Joints(NamedTuple):
+    """Joint data of ``n`` segments (row 0, the root, is not used).
+
+    Attributes
+    ----------
+    centre : (n, 4) quaternion of the child relative to its parent at the centre of the range.
+    half_range : (n, 3) rad, half width of the range.
+    neutral : (n, 3) rad, where the passive stiffness is at rest, from the centre.
+    stiffness_low, stiffness_high : (n, 3) N m/rad, passive, on either side of the neutral value.
+    stop_low, stop_high : (n, 3) N m/rad, beyond the range.
+    damping : (n, 3) N m s/rad.
+    friction : (n,) N m.
+    onset : (n,) rad, over which the stops fade in.
+    """
+
+    centre: Array
+    half_range: Array
+    neutral: Array
+    stiffness_low: Array
+    stiffness_high: Array
+    stop_low: Array
+    stop_high: Array
+    damping: Array
+    friction: Array
+    onset: Array
 
 
 def build_joints(body: Body, *, neck_stiffness: float = 1.0, muscle_tone: float = 1.0) -> Joints:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from models import data
-from models.multibody.rotation import axis_rotation, matrix_of, multiply
 from models.pedestrian.anthropometry import PARENTS, SEGMENTS, Body, region_of
+from models.rotation import axis_rotation, matrix_of, multiply
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from models import data
 from models.contact.law import ForceCurve
-from models.multibody.surfaces import MAXIMUM_DEPTH, PANEL, ROLL, Zones
+from models.vehicle.zones import MAXIMUM_DEPTH, PANEL, ROLL, Zones
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,171 @@
+"""Contact of the segments with the road and with each other."""
+
+import math
+
+from models.compilation import inlined_kernel
+from models.contact.geometry import ellipsoid_direction, shape_matrix
+from models.contact.law import DAMPING_ONSET, contact_force
+from models.multibody.surfaces import (
+    CONTACT_DAMPING,
+    FRICTION,
+    ROAD_NORMAL,
+    SELF_NORMAL,
+    friction_coefficient,
+    point_velocity,
+    push,
+)
+
+
+@inlined_kernel
+def apply_road_contacts(zones, ellipsoids, motion, loads, contacts, tree, power):
+    """Add the loads of the road, the plane z = 0, on all segments."""
+    road = zones.radius.shape[0]
+    mu = zones.friction[road]
+    for i in range(tree.mass.shape[0]):
+        contacts.segment_force[i, road] = 0.0
+        if contacts.centre[i, 2] > ellipsoids.reach[i]:
+            contacts.largest[i, road] = 0.0
+            continue
+        R20, R21, R22 = motion.rotation[i, 2, 0], motion.rotation[i, 2, 1], motion.rotation[i, 2, 2]
+        a, b, c = (
+            ellipsoids.square[i, 0] * R20,
+            ellipsoids.square[i, 1] * R21,
+            ellipsoids.square[i, 2] * R22,
+        )
+        h = math.sqrt(a * R20 + b * R21 + c * R22)
+        penetration = h - contacts.centre[i, 2]
+        if penetration <= 0.0:
+            # Flesh recovers once it leaves the road; a car's dent does not.
+            contacts.largest[i, road] = 0.0
+            continue
+        if penetration > contacts.largest[i, road]:
+            contacts.largest[i, road] = penetration
+        px = (
+            contacts.centre[i, 0]
+            - (
+                motion.rotation[i, 0, 0] * a
+                + motion.rotation[i, 0, 1] * b
+                + motion.rotation[i, 0, 2] * c
+            )
+            / h
+        )
+        py = (
+            contacts.centre[i, 1]
+            - (
+                motion.rotation[i, 1, 0] * a
+                + motion.rotation[i, 1, 1] * b
+                + motion.rotation[i, 1, 2] * c
+            )
+            / h
+        )
+        pz = contacts.centre[i, 2] - h
+        vx, vy, vz = point_velocity(motion, i, px, py, pz)
+        law = ellipsoids.surface_law[i, road]
+        elastic, viscous = contact_force(
+            ellipsoids.laws,
+            law,
+            ellipsoids.counts[law],
+            ellipsoids.damping[law],
+            DAMPING_ONSET,
+            penetration,
+            -vz,
+            contacts.largest[i, road],
+        )
+        normal = elastic + viscous
+        slip = vx * vx + vy * vy
+        drag = friction_coefficient(mu, normal, slip, tree.mass[i])
+        push(motion, loads, i, px, py, pz, -drag * vx, -drag * vy, normal)
+        power[ROAD_NORMAL] += elastic * vz
+        power[CONTACT_DAMPING] += viscous * vz
+        power[FRICTION] -= drag * slip
+        contacts.zone_force[road] += normal
+        contacts.segment_force[i, road] = normal
+
+
+@inlined_kernel
+def apply_self_contacts(ellipsoids, motion, loads, contacts, tree, power):
+    """Add the loads between segments (head and arms against the trunk, leg against leg)."""
+    for k in range(ellipsoids.pairs.shape[0]):
+        i, j = ellipsoids.pairs[k, 0], ellipsoids.pairs[k, 1]
+        dx = contacts.centre[i, 0] - contacts.centre[j, 0]
+        dy = contacts.centre[i, 1] - contacts.centre[j, 1]
+        dz = contacts.centre[i, 2] - contacts.centre[j, 2]
+        limit = ellipsoids.reach[i] + ellipsoids.reach[j]
+        if dx * dx + dy * dy + dz * dz > limit * limit:
+            contacts.pair_largest[k] = 0.0
+            continue
+        A = shape_matrix(
+            motion.rotation,
+            i,
+            ellipsoids.square[i, 0],
+            ellipsoids.square[i, 1],
+            ellipsoids.square[i, 2],
+        )
+        B = shape_matrix(
+            motion.rotation,
+            j,
+            ellipsoids.square[j, 0],
+            ellipsoids.square[j, 1],
+            ellipsoids.square[j, 2],
+        )
+        # The last direction gives a lower bound on the separation, mostly enough to go on.
+        nx = contacts.pair_normal[k, 0]
+        ny = contacts.pair_normal[k, 1]
+        nz = contacts.pair_normal[k, 2]
+        ha = math.sqrt(_form(A, nx, ny, nz))
+        hb = math.sqrt(_form(B, nx, ny, nz))
+        if nx * dx + ny * dy + nz * dz - ha - hb > -ellipsoids.pair_gap[k]:
+            contacts.pair_largest[k] = 0.0
+            continue
+        nx, ny, nz, separation = ellipsoid_direction(dx, dy, dz, A, B, nx, ny, nz)
+        contacts.pair_normal[k, 0] = nx
+        contacts.pair_normal[k, 1] = ny
+        contacts.pair_normal[k, 2] = nz
+        penetration = -separation - ellipsoids.pair_gap[k]
+        if penetration <= 0.0:
+            contacts.pair_largest[k] = 0.0
+            continue
+        if penetration > contacts.pair_largest[k]:
+            contacts.pair_largest[k] = penetration
+        ha = math.sqrt(_form(A, nx, ny, nz))
+        depth = -0.5 * separation
+        # Half way between the two deepest points.
+        px = contacts.centre[i, 0] - (A[0] * nx + A[1] * ny + A[2] * nz) / ha + depth * nx
+        py = contacts.centre[i, 1] - (A[1] * nx + A[3] * ny + A[4] * nz) / ha + depth * ny
+        pz = contacts.centre[i, 2] - (A[2] * nx + A[4] * ny + A[5] * nz) / ha + depth * nz
+        ix, iy, iz = point_velocity(motion, i, px, py, pz)
+        jx, jy, jz = point_velocity(motion, j, px, py, pz)
+        vx, vy, vz = ix - jx, iy - jy, iz - jz
+        rate = -(vx * nx + vy * ny + vz * nz)
+        law = ellipsoids.pairs[k, 2]
+        elastic, viscous = contact_force(
+            ellipsoids.laws,
+            law,
+            ellipsoids.counts[law],
+            ellipsoids.damping[law],
+            DAMPING_ONSET,
+            penetration,
+            rate,
+            contacts.pair_largest[k],
+        )
+        normal = elastic + viscous
+        tx, ty, tz = vx + rate * nx, vy + rate * ny, vz + rate * nz
+        slip = tx * tx + ty * ty + tz * tz
+        mass = min(tree.mass[i], tree.mass[j])
+        c = friction_coefficient(ellipsoids.pair_friction, normal, slip, mass)
+        fx, fy, fz = normal * nx - c * tx, normal * ny - c * ty, normal * nz - c * tz
+        push(motion, loads, i, px, py, pz, fx, fy, fz)
+        push(motion, loads, j, px, py, pz, -fx, -fy, -fz)
+        power[SELF_NORMAL] -= elastic * rate
+        power[CONTACT_DAMPING] -= viscous * rate
+        power[FRICTION] -= c * slip
+
+
+@inlined_kernel
+def _form(A, x, y, z):
+    return (
+        A[0] * x * x
+        + A[3] * y * y
+        + A[5] * z * z
+        + 2.0 * (A[1] * x * y + A[2] * x * z + A[4] * y * z)
+    )

@@ -1,0 +1,48 @@
+"""The front of a car as the compiled core takes it.
+
+The front is a row of *zones* in its own frame (x forward, z up, origin on the road under the
+foremost point): rolls (cylinders across the car: lower bumper, bumper, hood edge) and panels
+(planes: grille, hood, windscreen, roof). Seen from above every zone follows a parabola of the
+given curvature.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+ROLL, PANEL = 0, 1
+
+MAXIMUM_DEPTH = 0.30
+"""Depth (m) below a panel beyond which a segment counts as under the car, not in it (assumed)."""
+
+
+class Zones(NamedTuple):
+    """Car front, ``z`` zones.
+
+    Attributes
+    ----------
+    kind : (z,) ``ROLL`` or ``PANEL``.
+    origin : (z, 2) m, x and z of the roll's axis or of the panel's front border.
+    radius : (z,) m (panel: 0).
+    direction : (z, 2) unit vector (x, z) along the panel, front to rear.
+    length : (z,) m along the panel.
+    arc : (z, 2) rad, lowest and highest direction of the roll's normal, from x towards z.
+    half_width : (z,) m. curvature : (z,) 1/m seen from above.
+    box : (z, 4) m, lowest and highest x, lowest and highest z that a contact point can have.
+    friction : (z + 1,) against the body; the last one is the road's.
+    """
+
+    kind: Index
+    origin: Array
+    radius: Array
+    direction: Array
+    length: Array
+    arc: Array
+    half_width: Array
+    curvature: Array
+    box: Array
+    friction: Array

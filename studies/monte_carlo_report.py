@@ -1,0 +1,156 @@
+"""The report of a Monte Carlo study: what its numbers say, in words, tables and pictures."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mcstudy import units
+from mcstudy.config import MonteCarloStudy
+from mcstudy.figures import style
+from mcstudy.report import Section, Table
+from mcstudy.text import interval, number, percent, quantity, unit
+from models.protocol import Model
+
+
+def sections_of(
+    study: MonteCarloStudy,
+    model: Model,
+    runs: pd.DataFrame,
+    manifest: Mapping[str, Any],
+    analysis: Mapping[str, Any],
+    figures: Mapping[str, Any],
+) -> list[Section]:
+    """Return the sections of the report."""
+    captions = {
+        "distributions": "Above: runs by output; shaded the central 90 %, the median with its 95 % "
+        "interval. Below: cumulative share with a 95 % band for the whole curve. The widest "
+        "0.2 % of the runs at either end lie outside the picture above.",
+        "throw_and_wad": "Throw and wrap-around distance of every run, and the accident's own.",
+        "impact_speed": "Outputs against impact speed: median and 90 % band of the runs around it.",
+        "rank_correlation": "Spearman rank correlation of inputs and outputs; grey: not "
+        "distinguishable from zero.",
+        "convergence": "Median over growing parts of the study.",
+    }
+
+    def pick(*names: str) -> dict[str, Any]:
+        return {captions[name]: figures[name] for name in names if name in figures}
+
+    return [
+        Section("Result", _summary(study, model, analysis), [_output_table(study, model, analysis)],
+                pick("distributions")),
+        Section("The accident", _accident(analysis, model), (), pick("throw_and_wad")),
+        Section("What goes with what", (
+            "Rank correlations say which inputs an output follows, one at a time; they are no "
+            "share of variance.",), (), pick("impact_speed", "rank_correlation")),
+        Section("Inputs", (), [_input_table(study, model, runs)]),
+        Section("How sure the numbers are", (_honesty(study),), [_status_table(manifest)],
+                pick("convergence")),
+        Section("The model", _model_notes(model)),
+    ]  # fmt: skip
+
+
+def _summary(study: MonteCarloStudy, model: Model, analysis: Mapping[str, Any]) -> list[str]:
+    unit_of = {item.name: item.unit for item in model.outputs}
+    lines = []
+    for name in study.report.outputs:
+        q = analysis["outputs"][name]["quantiles"]
+        u = unit(unit_of[name])
+        lines.append(
+            f"{style.words(name)}: median {interval(q['0.5'])} {u}; nine runs in ten lie between "
+            f"{number(q['0.05']['value'])} and {number(q['0.95']['value'])} {u}.".replace(" .", ".")
+        )
+    for name, entries in analysis["exceedance"].items():
+        lines += [
+            f"{style.words(name)} exceeds {quantity(e['value'], unit_of[name])} ({e['label']}) in "
+            f"{percent(e['probability_above'])} of the runs."
+            for e in entries
+        ]
+    return lines
+
+
+def _accident(analysis: Mapping[str, Any], model: Model) -> list[str]:
+    unit_of = {item.name: item.unit for item in model.outputs}
+    lines = []
+    for name, entries in analysis["observed"].items():
+        for e in entries:
+            where = "inside" if e["inside_central_90"] else "OUTSIDE"
+            lines.append(
+                f"{style.words(name)}: the observed {quantity(e['value'], unit_of[name])} "
+                f"({e['label']}) lies {where} the central 90 % of the prediction, at its "
+                f"{100.0 * e['percentile']:.0f} % point."
+            )
+    return lines or ["The study file names no observed values."]
+
+
+def _output_table(study: MonteCarloStudy, model: Model, analysis: Mapping[str, Any]) -> Table:
+    rows = []
+    for item in model.outputs:
+        entry = analysis["outputs"][item.name]
+        if "mean" not in entry:
+            continue
+        q = entry["quantiles"]
+        rows.append(
+            [
+                item.name,
+                unit(item.unit) or "–",
+                interval(entry["mean"]),
+                number(entry["sd"]["value"]),
+                *(number(q[p]["value"]) for p in ("0.05", "0.5", "0.95")),
+                str(entry["undefined"]),
+            ]
+        )
+    head = ["output", "unit", "mean (95 % interval)", "sd", "5 %", "median", "95 %", "undefined"]
+    return Table(
+        "All outputs. 'undefined' counts runs in which an output has no value.", head, rows
+    )
+
+
+def _input_table(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> Table:
+    rows = []
+    for item in model.inputs:
+        if item.name in study.inputs:
+            spec = study.inputs[item.name]
+            scale = 1.0 / units.factor(spec.unit, item.unit)
+            low, middle, high = np.quantile(runs[item.name] * scale, [0.05, 0.5, 0.95])
+            shown = [spec.distribution, number(low), number(middle), number(high), unit(spec.unit)]
+        else:
+            value = float(runs[item.name].iloc[0])
+            shown = ["fixed", "", number(value), "", unit(item.unit)]
+        rows.append([item.name, *shown, item.meaning])
+    head = ["input", "distribution", "5 %", "median or value", "95 %", "unit", "meaning"]
+    return Table("Inputs as sampled, in the study file's units.", head, rows)
+
+
+def _status_table(manifest: Mapping[str, Any]) -> Table:
+    rows: Sequence[Sequence[str]] = [
+        [status, f"{count:,}"] for status, count in manifest["counts"].items()
+    ]
+    return Table("How the runs ended.", ["status", "runs"], rows)
+
+
+def _honesty(study: MonteCarloStudy) -> str:
+    if study.design.method == "monte-carlo":
+        return (
+            "Samples are independent: quantiles have order-statistic intervals, probabilities "
+            "Wilson intervals, means t intervals, all at 95 %. They count the sampling error only, "
+            "not what the model itself gets wrong."
+        )
+    return (
+        f"The design is {study.design.n // study.design.size} independent replicates of "
+        f"{study.design.size} samples; every interval is a 95 % t interval from the spread between "
+        "the replicates. It counts the sampling error only, not what the model itself gets wrong."
+    )
+
+
+def _model_notes(model: Model) -> list[str]:
+    calibrated = [item for item in model.inputs if item.source.startswith("calibrated")]
+    lines = [f"Model {model.name}, version {model.version}."]
+    if calibrated:
+        lines.append(
+            "Calibrated to the multibody rows of the case's tables (throw, WAD, HIC15, head dent): "
+            + ", ".join(f"{i.name} (nominal {quantity(i.nominal, i.unit)})" for i in calibrated)
+            + ". Every other output of the nominal run is a prediction."
+        )
+    return lines

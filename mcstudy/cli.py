@@ -39,39 +39,19 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Run a study, or go on with it where it stopped, and write its report."""
-    from mcstudy.config import MonteCarloStudy, load_study
-    from studies import monte_carlo, reconstruction
+    from studies import api
 
-    checked = load_study(study)
-    if not isinstance(checked, MonteCarloStudy):
-        raise UserError(
-            f"{study}: kind {checked.kind!r} is run by 'mcstudy reconstruct', not by 'run'"
-        )
-    folder = reconstruction.default_folder(checked, out)
-    analysis = monte_carlo.run_monte_carlo(
-        checked,
-        monte_carlo.study_text(study),
-        folder,
-        workers=workers,
-        quiet=quiet or as_json,
-    )
+    folder = api.run_study(study, out=out, workers=workers, quiet=quiet or as_json)
+    analysis = folder.read_json("analysis.json")
     _print_analysis(analysis, folder.path, quiet=quiet, as_json=as_json)
 
 
 @app.command()
 def reconstruct(study: Study, out: Out = None, quiet: Quiet = False, as_json: Json = False) -> None:
     """Run one case, print it beside published tables and draw it."""
-    from mcstudy.config import Reconstruction, load_study
-    from studies import monte_carlo, reconstruction
+    from studies import api, reconstruction
 
-    checked = load_study(study)
-    if not isinstance(checked, Reconstruction):
-        raise UserError(f"{study}: kind {checked.kind!r} is run by 'mcstudy run'")
-    case, tables = reconstruction.reconstruct(checked)
-    folder = reconstruction.default_folder(checked, out)
-    reconstruction.write_reconstruction(
-        checked, monte_carlo.study_text(study), case, tables, folder
-    )
+    case, tables, folder = api.run_case(study, out=out)
     if as_json:
         _print_json(dict(case.outputs) | {"status": case.status})
     elif not quiet:
@@ -118,29 +98,21 @@ def models(
     as_json: Json = False,
 ) -> None:
     """List the models, or the inputs and outputs of one."""
-    from models.registry import load_model, model_names
+    from studies import catalogue
 
     if name is None:
         if as_json:
-            _print_json({"models": list(model_names())})
+            _print_json({"models": list(catalogue.model_names())})
         else:
-            print("\n".join(model_names()))
+            print("\n".join(catalogue.model_names()))
         return
-    try:
-        model = load_model(name)
-    except ValueError as error:
-        raise UserError(str(error)) from None
-    inputs = [
-        {"name": i.name, "unit": i.unit, "nominal": i.nominal, "low": i.low, "high": i.high,
-         "meaning": i.meaning, "source": i.source}
-        for i in model.inputs
-    ]  # fmt: skip
-    outputs = [{"name": o.name, "unit": o.unit, "meaning": o.meaning} for o in model.outputs]
+    described = catalogue.describe(name)
     if as_json:
-        _print_json({"name": name, "version": model.version, "inputs": inputs, "outputs": outputs})
+        _print_json(described)
         return
     console = Console()
-    for title, rows in (("inputs", inputs), ("outputs", outputs)):
+    for title in ("inputs", "outputs"):
+        rows = described[title]
         table = RichTable(*rows[0], title=title)
         for row in rows:
             table.add_row(*(f"{v:.5g}" if isinstance(v, float) else str(v) for v in row.values()))

@@ -5,7 +5,6 @@ import platform
 import time
 from collections.abc import Mapping
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import joblib
@@ -273,8 +272,3 @@ def _manifest(
         "workers": workers,
         "finished": False,
     }  # fmt: skip
-
-
-def study_text(path: Path) -> str:
-    """Return the text of a study file."""
-    return path.read_text(encoding="utf-8")

@@ -51,6 +51,11 @@ def sections_of(
     ]  # fmt: skip
 
 
+def _title(name: str) -> str:
+    words = style.words(name)
+    return words[0].upper() + words[1:]
+
+
 def _summary(study: MonteCarloStudy, model: Model, analysis: Mapping[str, Any]) -> list[str]:
     unit_of = {item.name: item.unit for item in model.outputs}
     lines = []
@@ -58,12 +63,12 @@ def _summary(study: MonteCarloStudy, model: Model, analysis: Mapping[str, Any]) 
         q = analysis["outputs"][name]["quantiles"]
         u = unit(unit_of[name])
         lines.append(
-            f"{style.words(name)}: median {interval(q['0.5'])} {u}; nine runs in ten lie between "
+            f"{_title(name)}: median {interval(q['0.5'])} {u}; nine runs in ten lie between "
             f"{number(q['0.05']['value'])} and {number(q['0.95']['value'])} {u}.".replace(" .", ".")
         )
     for name, entries in analysis["exceedance"].items():
         lines += [
-            f"{style.words(name)} exceeds {quantity(e['value'], unit_of[name])} ({e['label']}) in "
+            f"{_title(name)} exceeds {quantity(e['value'], unit_of[name])} ({e['label']}) in "
             f"{percent(e['probability_above'])} of the runs."
             for e in entries
         ]
@@ -77,7 +82,7 @@ def _accident(analysis: Mapping[str, Any], model: Model) -> list[str]:
         for e in entries:
             where = "inside" if e["inside_central_90"] else "OUTSIDE"
             lines.append(
-                f"{style.words(name)}: the observed {quantity(e['value'], unit_of[name])} "
+                f"{_title(name)}: the observed {quantity(e['value'], unit_of[name])} "
                 f"({e['label']}) lies {where} the central 90 % of the prediction, at its "
                 f"{100.0 * e['percentile']:.0f} % point."
             )

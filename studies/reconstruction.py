@@ -1,7 +1,6 @@
 """The reconstruction: one run, printed beside published tables and drawn."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -199,8 +198,3 @@ def as_table(comparison: Comparison) -> Table:
         ["", *comparison.head],
         [[label, *(number(value, 4) for value in values)] for label, values in comparison.rows],
     )
-
-
-def default_folder(study: config.Study, out: Path | None) -> ResultsFolder:
-    """Return the results folder of a study: ``--out`` or ``results/<name>``."""
-    return ResultsFolder(out if out is not None else Path("results") / study.name)

@@ -24,7 +24,7 @@ from models.multibody.simulation import (
 )
 from models.multibody.surfaces import CHANNELS, empty_contacts
 from models.multibody.tree import empty_loads
-from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
+from models.pedestrian.anthropometry import HEAD, LARGEST_HEAD_SHARE, SEGMENTS, TRUNK
 from models.protocol import OK, Batch, Input, Output, Run, complete_inputs
 from models.vehicle.profile import Vehicle, load_vehicle
 
@@ -41,6 +41,7 @@ FRAME_INTERVAL = 2e-3
 
 NO_CONTACT = "no_contact"
 NO_HEAD_CONTACT = "no_head_contact"
+IMPOSSIBLE_BODY = "impossible_body"
 
 
 @functools.cache
@@ -118,8 +119,8 @@ class MultibodyModel:
         """
         values = complete_inputs(self, inputs)
         raw = self._simulate(values)
-        if raw is None:
-            return Run(values, NO_CONTACT, NO_CONTACT, self._empty())
+        if isinstance(raw, str):
+            return Run(values, raw, raw, self._empty())
         status, outputs = self._judge(raw)
         return Run(
             values,
@@ -150,8 +151,8 @@ class MultibodyModel:
         status = []
         for k, row in enumerate(rows):
             raw = self._simulate(complete_inputs(self, dict(zip(names, row.tolist(), strict=True))))
-            if raw is None:
-                status.append(NO_CONTACT)
+            if isinstance(raw, str):
+                status.append(raw)
                 continue
             word, outputs = self._judge(raw)
             status.append(word)
@@ -173,9 +174,12 @@ class MultibodyModel:
             return "not_finite", self._empty()
         return OK, outputs
 
-    def _simulate(self, values: dict[str, float]) -> outcome.Raw | None:
+    def _simulate(self, values: dict[str, float]) -> outcome.Raw | str:
+        """Return what the step loop leaves behind, or the status that keeps it from starting."""
+        if values["head_mass"] >= LARGEST_HEAD_SHARE * values["body_mass"]:
+            return IMPOSSIBLE_BODY
         crash = build_crash(values, self.vehicle)
-        return None if crash is None else self._step(crash, values)
+        return NO_CONTACT if crash is None else self._step(crash, values)
 
     def _step(self, crash: Crash, values: dict[str, float]) -> outcome.Raw:
         n, zones = len(SEGMENTS), len(self.vehicle.zones)

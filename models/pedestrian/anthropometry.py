@@ -36,6 +36,8 @@ SEGMENTS = (
 )
 PARENTS = (-1, 0, 1, 2, 3, 2, 5, 2, 7, 0, 9, 10, 0, 12, 13)
 HEAD = SEGMENTS.index("head")
+LARGEST_HEAD_SHARE = 0.5
+"""Share of the body's mass beyond which a head is refused (assumed; a newborn's is about 0.3)."""
 HEAD_INERTIA_FACTOR = 1.15
 """A skull carries its mass further out than a homogeneous ellipsoid: the data sheet allows 15 %
 more for the head [estimated]."""
@@ -146,7 +148,7 @@ def build_body(
 
     mass = between(child.mass, adult.mass) * body_mass
     if head_mass is not None:
-        if not 0.0 < head_mass < 0.5 * body_mass:
+        if not 0.0 < head_mass < LARGEST_HEAD_SHARE * body_mass:
             raise ValueError(f"head mass {head_mass:g} kg does not fit a body of {body_mass:g} kg")
         mass *= (body_mass - head_mass) / (body_mass - mass[HEAD])
         mass[HEAD] = head_mass

@@ -88,6 +88,16 @@ def test_a_body_beside_the_car_is_a_status_and_not_an_error(model: MultibodyMode
     assert all(math.isnan(value) for value in run.outputs.values())
 
 
+def test_a_body_that_cannot_be_is_a_status_in_a_batch(model: MultibodyModel) -> None:
+    names = [item.name for item in model.inputs]
+    rows = np.tile([item.nominal for item in model.inputs], (2, 1))
+    rows[0, names.index("body_mass")] = 9.5
+    rows[0, names.index("head_mass")] = 6.0
+    batch = model.run_batch(rows)
+    assert batch.status == ["impossible_body", "ok"]
+    assert np.isnan(batch.outputs[0]).all()
+
+
 def test_throw_grows_with_impact_speed_and_stays_near_searle(model: MultibodyModel) -> None:
     # Searle 1983: v_min = sqrt(2 mu g s / (1 + mu^2)), v_max = sqrt(2 mu g s). The body leaves
     # the car at about 0.8 of its speed, so the throw lies below the v_min line's by (0.8)^2.

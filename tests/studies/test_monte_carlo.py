@@ -9,6 +9,7 @@ from mcstudy.config import MonteCarloStudy, parse_study
 from mcstudy.errors import StudyError, UserError
 from mcstudy.results import ResultsFolder, digest
 from models.registry import load_model
+from studies.api import rerun
 from studies.monte_carlo import build_report, run_monte_carlo
 
 SMALL = (
@@ -111,6 +112,15 @@ def test_histories_of_the_first_run_belong_to_it(folder: ResultsFolder) -> None:
     row = folder.runs().iloc[0]
     primary = history[history["time"] < row["ground_time"]]
     assert primary["acceleration"].max() == pytest.approx(row["peak_head_acceleration"], rel=0.02)
+
+
+def test_any_run_can_be_run_again_to_the_same_bits(folder: ResultsFolder) -> None:
+    row = folder.runs().iloc[13]
+    again = rerun(folder, 13)
+    assert {name: row[name] for name in again.outputs} == dict(again.outputs)
+    assert again.histories["head"].time.size > 1000
+    with pytest.raises(UserError, match="has no run 99"):
+        rerun(folder, 99)
 
 
 def test_too_many_failures_stop_the_study(tmp_path: Path) -> None:

@@ -1,0 +1,272 @@
+"""The runner: same numbers however it is run, nothing lost that arrived, nothing run twice."""
+
+import multiprocessing
+import os
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import joblib
+import numpy as np
+import pandas as pd
+import pytest
+import toy_evaluation
+from numpy.typing import NDArray
+
+from mcstudy import designs, runner
+from mcstudy.errors import StudyError
+from mcstudy.progress import Progress
+from mcstudy.results import ResultsFolder, digest
+
+Array = NDArray[np.float64]
+
+N = 240
+SIZE = 20
+
+
+def task(n: int = N, evaluate: Any = toy_evaluation.evaluate, argument: Any = None) -> runner.Task:
+    return runner.Task(
+        evaluate=evaluate,
+        argument=argument,
+        inputs=designs.draw("latin-hypercube", n, SIZE, 2, seed=4),
+        input_names=toy_evaluation.NAMES,
+        output_names=toy_evaluation.OUTPUTS,
+        replicate=np.arange(n) // SIZE,
+    )
+
+
+def run(work: runner.Task, folder: ResultsFolder, workers: int = 1) -> pd.DataFrame:
+    with (
+        folder.open_for_writing(),
+        joblib.parallel_config(backend="loky", n_jobs=workers),
+    ):
+        return runner.run(work, folder, Progress(quiet=True))
+
+
+def kept(folder: ResultsFolder) -> set[int]:
+    found = folder.done()
+    return set() if found is None else set(found["run"].tolist())
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> ResultsFolder:
+    return ResultsFolder(tmp_path / "study")
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+    return run(task(), ResultsFolder(tmp_path_factory.mktemp("reference")))
+
+
+class Recording:
+    """An evaluation in this process that keeps the rows it is given and may stop."""
+
+    def __init__(self, work: runner.Task, stop_after: int = 10**9, error: Any = None) -> None:
+        self.ids = {tuple(row): k for k, row in enumerate(work.inputs.tolist())}
+        self.seen: list[int] = []
+        self.calls, self.stop_after, self.error = 0, stop_after, error
+
+    def __call__(self, argument: object, rows: Array) -> tuple[Array, list[str]]:
+        self.calls += 1
+        if self.calls > self.stop_after:
+            raise self.error
+        self.seen += [self.ids[tuple(row)] for row in rows.tolist()]
+        return toy_evaluation.evaluate(argument, rows)
+
+
+def recorded(n: int = N, **stop: Any) -> tuple[runner.Task, Recording]:
+    recording = Recording(task(n), **stop)
+    return task(n, evaluate=recording), recording
+
+
+# -- numbers ---------------------------------------------------------------------------------
+
+
+def test_the_table_holds_inputs_outputs_and_status_by_run(reference: pd.DataFrame) -> None:
+    work = task()
+    assert list(reference.columns) == ["run", "replicate", "x", "y", "total", "product", "status"]
+    np.testing.assert_array_equal(reference["run"], np.arange(N))
+    np.testing.assert_array_equal(reference["replicate"], np.arange(N) // SIZE)
+    np.testing.assert_array_equal(reference[["x", "y"]], work.inputs)
+    np.testing.assert_array_equal(reference["total"], work.inputs.sum(axis=1))
+
+
+def test_runs_without_a_value_are_rows_with_a_status_and_nan(reference: pd.DataFrame) -> None:
+    unsolved = reference["x"] > toy_evaluation.UNSOLVED
+    # A tenth of every Latin hypercube of twenty lies above nine tenths.
+    assert unsolved.sum() == N // 10
+    assert (reference["status"] == np.where(unsolved, "no_contact", "ok")).all()
+    assert reference["product"].isna().equals(unsolved)
+
+
+def test_two_workers_give_the_numbers_of_one(
+    folder: ResultsFolder, reference: pd.DataFrame
+) -> None:
+    assert digest(run(task(), folder, workers=2)) == digest(reference)
+    assert digest(folder.runs()) == digest(reference)
+
+
+@pytest.mark.parametrize("chunk", [1, 7, 1000])
+def test_the_size_of_chunks_changes_no_number(
+    folder: ResultsFolder, reference: pd.DataFrame, monkeypatch: pytest.MonkeyPatch, chunk: int
+) -> None:
+    monkeypatch.setattr(runner, "_chunk_size", lambda task, missing: chunk)
+    assert digest(run(task(), folder)) == digest(reference)
+    assert len(list((folder.path / "parts").iterdir())) == -(-N // chunk)
+
+
+@pytest.mark.xfail(
+    strict=True,
+    reason="bug: effective_n_jobs() is the number of cores whatever --workers says, "
+    "effective_n_jobs(None) is meant; with one worker joblib then warns of the timeout",
+)
+def test_one_worker_gives_no_warning(folder: ResultsFolder) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run(task(), folder, workers=1)
+
+
+def test_one_run_is_a_study_too(folder: ResultsFolder) -> None:
+    work = task(SIZE)
+    single = runner.Task(
+        work.evaluate, None, work.inputs[:1], work.input_names, work.output_names, np.array([0])
+    )
+    assert len(run(single, folder)) == 1
+
+
+# -- going on --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), MemoryError(), ValueError("a bug")])
+def test_an_interrupted_run_keeps_what_arrived_and_goes_on(
+    folder: ResultsFolder, reference: pd.DataFrame, error: BaseException
+) -> None:
+    work, recording = recorded(stop_after=5, error=error)
+    with pytest.raises(type(error)):
+        run(work, folder)
+    arrived = kept(folder)
+    assert 0 < len(arrived) < N
+    assert arrived <= set(recording.seen)
+    work, recording = recorded()
+    assert digest(run(work, folder)) == digest(reference)
+    assert not arrived & set(recording.seen)
+    assert set(recording.seen) == set(range(N)) - arrived
+
+
+def test_a_run_resumed_with_other_workers_gives_the_same_numbers(
+    folder: ResultsFolder, reference: pd.DataFrame
+) -> None:
+    for start in (180, 20, 100):
+        folder.add_part(reference.iloc[start : start + 33])
+    assert digest(run(task(), folder, workers=2)) == digest(reference)
+
+
+def test_kept_runs_are_not_run_again(folder: ResultsFolder, reference: pd.DataFrame) -> None:
+    marked = reference.iloc[:50].assign(total=-1.0)
+    folder.add_part(marked)
+    found = run(task(), folder)
+    np.testing.assert_array_equal(found["total"][:50], -1.0)
+    np.testing.assert_array_equal(found["total"][50:], reference["total"][50:])
+
+
+def test_a_finished_study_runs_nothing(folder: ResultsFolder, reference: pd.DataFrame) -> None:
+    folder.compact(reference)
+    work, recording = recorded()
+    assert digest(run(work, folder)) == digest(reference)
+    assert recording.calls == 0
+
+
+def test_a_torn_part_is_run_again(folder: ResultsFolder, reference: pd.DataFrame) -> None:
+    folder.add_part(reference.iloc[:60])
+    folder.add_part(reference.iloc[60:120])
+    torn = sorted((folder.path / "parts").iterdir())[0]
+    torn.write_bytes(torn.read_bytes()[:-40])
+    work, recording = recorded()
+    assert digest(run(work, folder)) == digest(reference)
+    assert set(recording.seen) == set(range(60)) | set(range(120, N))
+
+
+def test_a_study_of_twice_the_size_reuses_the_first_half(
+    folder: ResultsFolder, reference: pd.DataFrame
+) -> None:
+    folder.compact(reference)
+    work, recording = recorded(2 * N)
+    doubled = run(work, folder)
+    assert len(doubled) == 2 * N
+    assert digest(doubled.iloc[:N]) == digest(reference)
+    assert min(recording.seen) == N
+    assert digest(doubled) == digest(run(task(2 * N), ResultsFolder(folder.path / "afresh")))
+
+
+def test_a_smaller_study_takes_its_runs_from_the_larger_one(
+    folder: ResultsFolder, reference: pd.DataFrame
+) -> None:
+    folder.compact(reference)
+    work, recording = recorded(N // 2)
+    assert digest(run(work, folder)) == digest(reference.iloc[: N // 2])
+    assert recording.calls == 0
+
+
+# -- counting --------------------------------------------------------------------------------
+
+
+def test_progress_counts_the_failures_of_this_session(
+    folder: ResultsFolder, reference: pd.DataFrame
+) -> None:
+    folder.add_part(reference.iloc[:120])
+    for complete, expected in ((frozenset({"ok"}), 12), (frozenset({"ok", "no_contact"}), 0)):
+        progress = Progress(quiet=True, complete=complete)
+        other = ResultsFolder(folder.path / str(expected))
+        other.add_part(reference.iloc[:120])
+        with other.open_for_writing(), joblib.parallel_config(n_jobs=1):
+            runner.run(task(), other, progress)
+        assert progress.failed == expected
+
+
+# -- workers that go wrong -------------------------------------------------------------------
+
+
+@pytest.fixture
+def fresh_workers() -> Iterator[None]:
+    """Leave no broken or hanging worker to the next test."""
+    yield
+    from joblib.externals.loky import get_reusable_executor
+
+    get_reusable_executor().shutdown(wait=True, kill_workers=True)
+
+
+def fault() -> toy_evaluation.Fault:
+    """Return one of the last row: its chunk is the last to be sent."""
+    return {"driver": os.getpid(), "x": float(task().inputs[-1, 0])}
+
+
+@pytest.mark.usefixtures("fresh_workers")
+def test_a_dead_worker_is_a_study_error_and_what_arrived_is_kept(
+    folder: ResultsFolder, reference: pd.DataFrame
+) -> None:
+    with pytest.raises(StudyError, match="a worker process died"):
+        run(task(evaluate=toy_evaluation.evaluate_and_die, argument=fault()), folder, workers=2)
+    arrived = kept(folder)
+    assert 0 < len(arrived) < N
+    assert N - 1 not in arrived
+    assert digest(run(task(), folder, workers=2)) == digest(reference)
+
+
+@pytest.mark.usefixtures("fresh_workers")
+@pytest.mark.xfail(
+    strict=True,
+    raises=multiprocessing.TimeoutError,
+    reason="bug: joblib raises multiprocessing.TimeoutError, which is no TimeoutError",
+)
+def test_a_worker_that_hangs_is_a_study_error_and_what_arrived_is_kept(
+    folder: ResultsFolder, reference: pd.DataFrame, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The workers start first, so that their start is no part of the wait.
+    run(task(), ResultsFolder(folder.path / "start"), workers=2)
+    monkeypatch.setattr(runner, "STALL_TIME", 4.0)
+    with pytest.raises(StudyError, match="no chunk came back within 4 s"):
+        run(task(evaluate=toy_evaluation.evaluate_and_hang, argument=fault()), folder, workers=2)
+    arrived = kept(folder)
+    assert 0 < len(arrived) < N
+    assert digest(run(task(), folder)) == digest(reference)

@@ -16,7 +16,7 @@ from pydantic import (
     Field,
     FiniteFloat,
     NonNegativeInt,
-    PositiveInt,
+    Strict,
     TypeAdapter,
     ValidationError,
     model_validator,
@@ -24,16 +24,26 @@ from pydantic import (
 
 from mcstudy import designs, units
 from mcstudy.errors import UserError
-from mcstudy.inputs import Distribution, copula_factor, sample_values, sampling_order
+from mcstudy.inputs import (
+    DISTRIBUTION_NAMES,
+    Distribution,
+    copula_factor,
+    sample_values,
+    sampling_order,
+)
 from mcstudy.simulator import Simulator
 
 Array = NDArray[np.float64]
 
 FORMAT = "mcstudy-study/1"
 
+LARGEST_DESIGN = 10_000_000
+"""Runs that one study may have; their table fits a machine's memory."""
+LARGEST_SEED = 2**63 - 1
+
 
 class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class ModelChoice(_Table):
@@ -64,14 +74,16 @@ class Design(_Table):
     """``[design]``: method, size and replicates."""
 
     method: Literal["monte-carlo", "latin-hypercube", "sobol"] = "latin-hypercube"
-    n: PositiveInt = 2000
-    replicate_size: PositiveInt | None = None
+    n: Annotated[int, Field(gt=0, le=LARGEST_DESIGN)] = 2000
+    replicate_size: Annotated[int, Field(gt=0, le=LARGEST_DESIGN)] | None = None
 
     @model_validator(mode="after")
     def _multiple(self) -> "Design":
         size = self.size
         if self.method == "monte-carlo" and size != 1:
             raise ValueError("replicate_size does not apply to monte-carlo: leave it out")
+        if self.method != "monte-carlo" and size < 2:
+            raise ValueError("replicate_size must be 2 or more: intervals come from replicates")
         if self.method == "sobol" and size & (size - 1):
             raise ValueError(f"replicate_size ({size}) of a sobol design must be a power of two")
         if self.n % size:
@@ -90,7 +102,7 @@ class Design(_Table):
 class Dependence(_Table):
     """``[dependence]``: correlations of normal scores, pairs of inputs."""
 
-    correlations: list[tuple[str, str, FiniteFloat]] = []
+    correlations: list[Annotated[tuple[str, str, FiniteFloat], Strict(False)]] = []
 
 
 class Report(_Table):
@@ -105,7 +117,7 @@ class _Common(_Table):
     format: Literal["mcstudy-study/1"]
     name: str
     title: str
-    seed: NonNegativeInt = 0
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 0
     model: ModelChoice
     fixed: dict[str, Value] = {}
 
@@ -177,8 +189,8 @@ def parse_study(text: str, source: str = "study") -> Study:
     """Check the text of a study file; see ``load_study``."""
     try:
         table = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise UserError(f"{source}: not valid TOML: {error}") from None
+    except (ValueError, RecursionError) as error:
+        raise UserError(f"{source}: not valid TOML: {_one_line(error)}") from None
     try:
         return _STUDY.validate_python(table)
     except ValidationError as error:
@@ -187,18 +199,28 @@ def parse_study(text: str, source: str = "study") -> Study:
 
 def _first_problem(error: ValidationError) -> str:
     problem = error.errors(include_url=False)[0]
-    tags = {"monte-carlo", "reconstruction", "uniform", "triangular", "normal", "lognormal",
-            "growth-chart"}  # fmt: skip
-    place = ".".join(str(part) for part in problem["loc"] if part not in tags) or "study"
+    parts = [str(part) for part in problem["loc"]]
+    # Pydantic puts the chosen kind of study and of distribution into the place; the file does not.
+    if parts and parts[0] in ("monte-carlo", "reconstruction"):
+        parts = parts[1:]
+    if len(parts) > 2 and parts[0] == "inputs" and parts[2] in DISTRIBUTION_NAMES:
+        del parts[2]
+    place = _one_line(".".join(parts) or "study")
     kind = problem["type"]
     if kind == "extra_forbidden":
         return f"{place}: unknown key"
     if kind == "missing":
         return f"{place}: missing"
-    message = problem["msg"].removeprefix("Value error, ")
+    message = _one_line(problem["msg"].removeprefix("Value error, "))
     given = problem.get("input")
-    shown = f" (given {given!r})" if isinstance(given, str | int | float) else ""
+    shown = f" (given {_one_line(repr(given))})" if isinstance(given, str | int | float) else ""
     return f"{place}: {message}{shown}"
+
+
+def _one_line(text: object, longest: int = 200) -> str:
+    """Return a text on one line, cut where it is long."""
+    line = " ".join(str(text).split())
+    return line if len(line) <= longest else line[:longest] + "..."
 
 
 def fixed_values(study: Study, model: Simulator) -> dict[str, float]:
@@ -251,7 +273,10 @@ def sample_inputs(study: MonteCarloStudy, model: Simulator) -> dict[str, Array]:
     uniforms = designs.draw(
         study.design.method, study.design.n, study.design.size, len(study.inputs), study.seed
     )
-    sampled = sample_values(uniforms, study.inputs, factor)
+    try:
+        sampled = sample_values(uniforms, study.inputs, factor)
+    except ValueError as error:
+        raise UserError(str(error)) from None
     fixed = fixed_values(study, model)
     columns: dict[str, Array] = {}
     for item in model.inputs:

@@ -2,7 +2,10 @@
 
 
 class UserError(Exception):
-    """The user's input is wrong; the message names the place and the cure (exit code 2)."""
+    """The user's input is wrong; the message, one line, names place and cure (exit code 2)."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(" ".join(message.split()))
 
 
 class StudyError(Exception):

@@ -6,18 +6,24 @@ values in the file's unit, converted to the model's unit by the caller.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, PositiveFloat, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 from scipy import special, stats
 
 Array = NDArray[np.float64]
 
 
+SMALLEST_SHARE = 1e-20
+"""Probability below which a truncation that leaves no more counts as a mistake (assumed)."""
+
+Positive = Annotated[FiniteFloat, Field(gt=0.0)]
+
+
 class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class _Distribution(_Table):
@@ -69,27 +75,34 @@ class Triangular(_Distribution):
 
 
 class _Truncated(_Distribution):
+    """A distribution by its normal score: ``value(z)`` with z standard normal, rising."""
+
     low: FiniteFloat | None = None
     high: FiniteFloat | None = None
 
     @model_validator(mode="after")
-    def _bounds(self) -> "_Truncated":
+    def _ordered(self) -> "_Truncated":
         if self.low is not None and self.high is not None and not self.low < self.high:
             raise ValueError(f"low ({self.low:g}) must be below high ({self.high:g})")
-        if self.high is not None and self._cumulative(self.high) <= 0.0:
-            raise ValueError(f"no probability is left below high ({self.high:g})")
-        if self.low is not None and self._cumulative(self.low) >= 1.0:
-            raise ValueError(f"no probability is left above low ({self.low:g})")
         return self
 
-    def _cumulative(self, value: float) -> float:
-        raise NotImplementedError
+    def _between(self, u: Array, low_score: Array, high_score: Array) -> Array:
+        """Return normal scores at probabilities ``u``, truncated to two scores."""
+        # Above the mean work with the upper tail, whose probabilities do not round to one.
+        upper = low_score > 0.0
+        a = np.where(upper, -high_score, low_score)
+        b = np.where(upper, -low_score, high_score)
+        v = np.where(upper, 1.0 - u, u)
+        low, high = special.ndtr(a), special.ndtr(b)
+        score = special.ndtri(low + (high - low) * v)
+        return np.asarray(np.where(upper, -score, score))
 
-    def _truncate(self, u: Array) -> Array:
-        """Return the probabilities of the untruncated distribution."""
-        low = 0.0 if self.low is None else self._cumulative(self.low)
-        high = 1.0 if self.high is None else self._cumulative(self.high)
-        return low + (high - low) * u
+    def _bounded(self, values: Array) -> Array:
+        """Return values with the last bits of rounding beyond the bounds taken off."""
+        return np.asarray(np.clip(values, self.low, self.high))
+
+
+_TruncatedType = TypeVar("_TruncatedType", bound=_Truncated)
 
 
 class Normal(_Truncated):
@@ -97,46 +110,59 @@ class Normal(_Truncated):
 
     distribution: Literal["normal"]
     mean: FiniteFloat
-    sd: PositiveFloat
+    sd: Positive
 
-    def _cumulative(self, value: float) -> float:
-        return float(special.ndtr((value - self.mean) / self.sd))
+    @model_validator(mode="after")
+    def _some_probability(self) -> "Normal":
+        return _check_reach(self, self._score(self.low, -np.inf), self._score(self.high, np.inf))
+
+    def _score(self, value: float | None, default: float) -> float:
+        return default if value is None else (value - self.mean) / self.sd
 
     def quantile(self, u: Array, given: Mapping[str, Array]) -> Array:
         """Return the values at probabilities ``u``."""
-        return np.asarray(self.mean + self.sd * special.ndtri(self._truncate(u)))
+        low = np.asarray(self._score(self.low, -np.inf))
+        high = np.asarray(self._score(self.high, np.inf))
+        return self._bounded(self.mean + self.sd * self._between(u, low, high))
 
 
 class LogNormal(_Truncated):
     """Log-normal by its median and the standard deviation of the logarithm."""
 
     distribution: Literal["lognormal"]
-    median: PositiveFloat
-    sigma: PositiveFloat
+    median: Positive
+    sigma: Positive
 
-    def _cumulative(self, value: float) -> float:
-        if value <= 0.0:
-            return 0.0
-        return float(special.ndtr(np.log(value / self.median) / self.sigma))
+    @model_validator(mode="after")
+    def _some_probability(self) -> "LogNormal":
+        return _check_reach(self, self._score(self.low, -np.inf), self._score(self.high, np.inf))
+
+    def _score(self, value: float | None, default: float) -> float:
+        if value is None:
+            return default
+        return float(np.log(value / self.median) / self.sigma) if value > 0.0 else -np.inf
 
     def quantile(self, u: Array, given: Mapping[str, Array]) -> Array:
         """Return the values at probabilities ``u``."""
-        return np.asarray(self.median * np.exp(self.sigma * special.ndtri(self._truncate(u))))
+        low = np.asarray(self._score(self.low, -np.inf))
+        high = np.asarray(self._score(self.high, np.inf))
+        return self._bounded(self.median * np.exp(self.sigma * self._between(u, low, high)))
 
 
-class GrowthChart(_Distribution):
+class GrowthChart(_Truncated):
     """LMS distribution of a body measure given age: ``M (1 + L S z)^(1/L)``.
 
     ``age`` names the input that holds the age; ``at`` lists ages (in that input's unit in the
-    file) and ``L``, ``M``, ``S`` the parameters there, interpolated linearly between.
+    file) and ``L``, ``M``, ``S`` the parameters there, interpolated linearly between. Truncated
+    where ``low`` or ``high`` is given.
     """
 
     distribution: Literal["growth-chart"]
     age: str
     at: Annotated[list[FiniteFloat], Field(min_length=2)]
     L: list[FiniteFloat]
-    M: list[PositiveFloat]
-    S: list[PositiveFloat]
+    M: list[Positive]
+    S: list[Positive]
 
     @model_validator(mode="after")
     def _lengths(self) -> "GrowthChart":
@@ -152,19 +178,54 @@ class GrowthChart(_Distribution):
         return (self.age,)
 
     def quantile(self, u: Array, given: Mapping[str, Array]) -> Array:
-        """Return the values at probabilities ``u`` and the ages ``given``."""
+        """Return the values at probabilities ``u`` and the ages ``given``.
+
+        Raises
+        ------
+        ValueError
+            If an age lies outside the chart.
+        """
         age = given[self.age]
+        if np.any((age < self.at[0]) | (age > self.at[-1])):
+            worst = age[(age < self.at[0]) | (age > self.at[-1])][0]
+            raise ValueError(
+                f"{self.age} = {worst:g} is outside the chart, {self.at[0]:g} to {self.at[-1]:g}"
+            )
         L, M, S = (np.interp(age, self.at, p) for p in (self.L, self.M, self.S))
-        z = special.ndtri(u)
-        inside = 1.0 + L * S * z
-        with np.errstate(invalid="ignore", divide="ignore"):
-            power = np.where(np.abs(L) > 1e-9, inside ** (1.0 / L), np.exp(S * z))
-        return np.asarray(M * power)
+        curved = np.abs(L) > 1e-9
+        power = np.where(curved, L, 1.0)
+
+        def score(value: float | None, default: float) -> Array:
+            if value is None:
+                return np.full(age.shape, default)
+            if value <= 0.0:
+                return np.full(age.shape, -np.inf)
+            ratio = value / M
+            return np.where(curved, (ratio**power - 1.0) / (power * S), np.log(ratio) / S)
+
+        z = self._between(u, score(self.low, -np.inf), score(self.high, np.inf))
+        inside = np.maximum(1.0 + L * S * z, 0.0)
+        with np.errstate(divide="ignore"):
+            values = M * np.where(curved, inside ** (1.0 / power), np.exp(S * z))
+        return self._bounded(values)
+
+
+def _check_reach(
+    distribution: _TruncatedType, low_score: float, high_score: float
+) -> _TruncatedType:
+    if special.ndtr(high_score) < SMALLEST_SHARE:
+        raise ValueError(f"no probability is left below high ({distribution.high:g})")
+    if special.ndtr(-low_score) < SMALLEST_SHARE:
+        raise ValueError(f"no probability is left above low ({distribution.low:g})")
+    return distribution
 
 
 Distribution = Annotated[
     Uniform | Triangular | Normal | LogNormal | GrowthChart, Field(discriminator="distribution")
 ]
+
+
+DISTRIBUTION_NAMES = ("uniform", "triangular", "normal", "lognormal", "growth-chart")
 
 
 def sampling_order(distributions: Mapping[str, Distribution]) -> list[str]:
@@ -236,6 +297,11 @@ def sample_values(
     uniforms : (n, d) in (0, 1), columns in the order of ``distributions``.
     distributions : d inputs by name.
     factor : (d, d) from ``copula_factor``.
+
+    Raises
+    ------
+    ValueError
+        Naming the input whose values cannot be drawn.
     """
     scores = special.ndtri(np.clip(uniforms, 1e-15, 1.0 - 1e-15))
     dependent = special.ndtr(scores @ factor.T)
@@ -246,5 +312,8 @@ def sample_values(
     }
     values: dict[str, Array] = {}
     for name in sampling_order(distributions):
-        values[name] = distributions[name].quantile(columns[name], values)
+        try:
+            values[name] = distributions[name].quantile(columns[name], values)
+        except ValueError as error:
+            raise ValueError(f"inputs.{name}: {error}") from None
     return values

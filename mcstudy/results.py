@@ -72,9 +72,8 @@ class ResultsFolder:
         """Write a text file at once: a reader sees the old one or the new one."""
         target = self.path / name
         target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = target.with_name(f".{target.name}.tmp")
-        temporary.write_text(text, encoding="utf-8")
-        temporary.replace(target)
+        with _replacing(target) as temporary:
+            temporary.write_text(text, encoding="utf-8")
 
     def write_json(self, name: str, content: Any) -> None:
         """Write a JSON file at once; NaN becomes null."""
@@ -84,9 +83,8 @@ class ResultsFolder:
         """Write a Parquet file at once."""
         target = self.path / name
         target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = target.with_name(f".{target.name}.tmp")
-        pq.write_table(pa.Table.from_pandas(frame, preserve_index=False), temporary)
-        temporary.replace(target)
+        with _replacing(target) as temporary:
+            pq.write_table(pa.Table.from_pandas(frame, preserve_index=False), temporary)
 
     def add_part(self, frame: pd.DataFrame) -> None:
         """Keep a chunk of runs."""
@@ -113,7 +111,10 @@ class ResultsFolder:
         for file in files + self._parts():
             try:
                 frames.append(pq.read_table(file).to_pandas())
-            except (OSError, pa.ArrowInvalid):
+            except FileNotFoundError:
+                # A run compacted its parts meanwhile: what they held is in the table now.
+                return self.done()
+            except pa.ArrowInvalid:
                 # A torn file is run again.
                 file.rename(file.with_suffix(".broken"))
         if not frames:
@@ -182,6 +183,17 @@ class ResultsFolder:
                 f"{self.path}: holds another study (it differs in {', '.join(differing[:4])}); "
                 "choose another --out or remove the folder"
             )
+
+
+@contextlib.contextmanager
+def _replacing(target: Path) -> Iterator[Path]:
+    """Give a temporary path and move it over ``target`` if all went well."""
+    temporary = target.with_name(f".{target.name}.tmp")
+    try:
+        yield temporary
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def to_json(content: Any) -> str:

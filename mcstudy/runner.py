@@ -4,6 +4,7 @@ The number of workers and the backend come from ``joblib.parallel_config``; a ta
 plain rows for a top-level function, so nothing of the driver travels with it.
 """
 
+import multiprocessing
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
@@ -15,6 +16,7 @@ import pandas as pd
 from joblib import Parallel, delayed, effective_n_jobs
 from numpy.typing import NDArray
 
+from mcstudy.chunk import evaluate_chunk
 from mcstudy.errors import StudyError
 from mcstudy.progress import Progress
 from mcstudy.results import ResultsFolder
@@ -86,15 +88,15 @@ def _run_chunks(task: Task, missing: NDArray[np.int64]) -> Iterable[pd.DataFrame
     workers = Parallel(
         return_as="generator_unordered",
         batch_size=1,
-        timeout=STALL_TIME if effective_n_jobs() > 1 else None,
+        timeout=STALL_TIME if effective_n_jobs(None) > 1 else None,
     )
     try:
         for ids, outputs, status in workers(
-            delayed(_evaluate)(task.evaluate, task.argument, ids, task.inputs[ids])
+            delayed(evaluate_chunk)(task.evaluate, task.argument, ids, task.inputs[ids])
             for ids in chunks
         ):
             yield _frame(task, ids, outputs, status)
-    except TimeoutError:
+    except (TimeoutError, multiprocessing.TimeoutError):
         raise StudyError(
             f"no chunk came back within {STALL_TIME:g} s; run again to resume"
         ) from None
@@ -104,16 +106,6 @@ def _run_chunks(task: Task, missing: NDArray[np.int64]) -> Iterable[pd.DataFrame
                 "a worker process died; what arrived is kept, run again to resume"
             ) from None
         raise
-
-
-def _evaluate(
-    evaluate: Callable[[Any, Array], tuple[Array, list[str]]],
-    argument: Any,
-    ids: NDArray[np.int64],
-    rows: Array,
-) -> tuple[NDArray[np.int64], Array, list[str]]:
-    outputs, status = evaluate(argument, rows)
-    return ids, outputs, status
 
 
 def _frame(task: Task, ids: NDArray[np.int64], outputs: Array, status: list[str]) -> pd.DataFrame:
@@ -132,5 +124,5 @@ def _chunk_size(task: Task, missing: NDArray[np.int64]) -> int:
     task.evaluate(task.argument, probe)
     cost = max((time.perf_counter() - start) / probe.shape[0], 1e-7)
     # A few chunks for every worker, so that none waits long for the last one.
-    fair = max(1, missing.size // (8 * max(1, effective_n_jobs())))
+    fair = max(1, missing.size // (8 * max(1, effective_n_jobs(None))))
     return int(np.clip(CHUNK_TIME / cost, 1, fair))

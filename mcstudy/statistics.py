@@ -38,7 +38,7 @@ def mean(values: Array, replicate: NDArray[np.int64] | None = None) -> Estimate:
     values : (n,) finite. replicate : (n,) or None if the samples are independent.
     """
     if replicate is not None:
-        return _between(values, replicate, lambda part: float(part.mean()))
+        return _between(values, replicate, lambda p: float(p.mean()), float(values.mean()))
     return _t_interval(values, float(values.mean()))
 
 
@@ -123,12 +123,11 @@ def _between(
     values: Array,
     replicate: NDArray[np.int64],
     estimator: Callable[[Array], float],
-    pooled: float | None = None,
+    pooled: float,
 ) -> Estimate:
     parts = [values[replicate == r] for r in np.unique(replicate)]
     estimates = np.array([estimator(part) for part in parts if part.size > 1])
-    value = float(estimates.mean()) if pooled is None else pooled
-    return _t_interval(estimates, value)
+    return _t_interval(estimates, pooled)
 
 
 def _t_interval(values: Array, centre: float) -> Estimate:

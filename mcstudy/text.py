@@ -12,8 +12,9 @@ def number(value: float | None, digits: int = 3) -> str:
         return "–"
     if value == 0.0:
         return "0"
-    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
-    return f"{value:,.{decimals}f}"
+    # The exponent after rounding: 9.999 to three digits is 10.0.
+    exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])
+    return f"{value:,.{max(0, digits - 1 - exponent)}f}"
 
 
 def unit(name: str) -> str:
@@ -37,8 +38,8 @@ def interval(estimate: Mapping[str, float | None], digits: int = 3) -> str:
 def percent(estimate: Mapping[str, float | None]) -> str:
     """Return a probability with its interval in per cent."""
     value, low, high = (estimate[k] for k in ("value", "low", "high"))
-    if value is None:
+    if value is None or not math.isfinite(value):
         return "–"
-    if low is None or high is None:
+    if low is None or high is None or not (math.isfinite(low) and math.isfinite(high)):
         return f"{100.0 * value:.1f} %"
     return f"{100.0 * value:.1f} % ({100.0 * low:.1f} to {100.0 * high:.1f} %)"

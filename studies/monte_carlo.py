@@ -97,7 +97,8 @@ def run_monte_carlo(
         start = time.perf_counter()
         with joblib.parallel_config(backend="loky", n_jobs=workers):
             runs = runner.run(task, folder, Progress(quiet=quiet, complete=complete))
-        folder.compact(runs)
+        # A study that was larger before keeps its further runs.
+        folder.compact(held if (held := folder.done()) is not None else runs)
         counts = {str(k): int(v) for k, v in runs["status"].value_counts().items()}
         manifest |= {
             "wall_time_s": round(time.perf_counter() - start, 3),
@@ -124,6 +125,7 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
         raise UserError(f"{folder.path}: is not the folder of a Monte Carlo study")
     model = load_study_model(study)
     runs = folder.runs()
+    runs = runs[runs["run"] < study.design.n]
     manifest = folder.read_json("manifest.json")
     analysis = analyse(study, model, runs)
     folder.write_json("analysis.json", analysis)
@@ -183,6 +185,8 @@ def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[st
         values = complete[name].to_numpy(dtype=float)
         finite = np.isfinite(values)
         part, parts = values[finite], None if groups is None else groups[finite]
+        if part.size < 2:
+            continue
         analysis["convergence"][name] = statistics.convergence(
             values, lambda v: float(np.median(v))
         )
@@ -212,8 +216,11 @@ def draw(
     """Return the study's figures by file name."""
     complete = runs[runs["status"].isin({OK} | model.partial_status)]
     unit_of = {item.name: item.unit for item in model.outputs}
-    wanted = {name: unit_of[name] for name in study.report.outputs}
+    # An output without a value in any run has nothing to draw.
+    wanted = {name: unit_of[name] for name in analysis["convergence"]}
     marks = marks_of(study, model)
+    if not wanted:
+        return {}
     figures = {
         "distributions": distributions.draw_distributions(
             complete, wanted, marks, analysis["outputs"]

@@ -59,7 +59,7 @@ def _title(name: str) -> str:
 def _summary(study: MonteCarloStudy, model: Model, analysis: Mapping[str, Any]) -> list[str]:
     unit_of = {item.name: item.unit for item in model.outputs}
     lines = []
-    for name in study.report.outputs:
+    for name in analysis["convergence"]:
         q = analysis["outputs"][name]["quantiles"]
         u = unit(unit_of[name])
         lines.append(

@@ -137,7 +137,12 @@ def draw_history(
         axes = figure.subplots()
         shown = time <= until
         for k, (name, values) in enumerate(channels.items()):
-            axes.plot(1e3 * time[shown], values[shown], label=name, color=style.PALETTE[k])
+            axes.plot(
+                1e3 * time[shown],
+                values[shown],
+                label=name,
+                color=style.PALETTE[k % len(style.PALETTE)],
+            )
         for name, at in (marks or {}).items():
             if at <= until:
                 axes.axvline(1e3 * at, color=style.GREY, linestyle="--", linewidth=1.0, label=name)

@@ -274,9 +274,6 @@ def test_histories_carry_units_and_show_milliseconds() -> None:
     assert [t.get_text() for t in legend.get_texts()] == ["hood", "bumper", "head meets the car"]
 
 
-@pytest.mark.xfail(
-    strict=True, raises=IndexError, reason="bug: the palette has eight colours and no ninth"
-)
 def test_histories_of_many_channels_are_drawn() -> None:
     time = np.linspace(0.0, 0.1, 11)
     channels = {f"zone {k}": time for k in range(9)}

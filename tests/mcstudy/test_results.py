@@ -142,12 +142,6 @@ def test_a_folder_of_torn_files_only_holds_no_runs(folder: ResultsFolder) -> Non
         folder.runs()
 
 
-@pytest.mark.xfail(
-    strict=True,
-    raises=FileNotFoundError,
-    reason="bug: reading (status, report) while a run compacts: the part is gone before it is "
-    "read, and setting it aside fails",
-)
 def test_a_part_that_the_writer_compacts_away_meanwhile_is_no_crash(
     folder: ResultsFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,6 +1,5 @@
 """The runner: same numbers however it is run, nothing lost that arrived, nothing run twice."""
 
-import multiprocessing
 import os
 import warnings
 from collections.abc import Iterator
@@ -116,11 +115,6 @@ def test_the_size_of_chunks_changes_no_number(
     assert len(list((folder.path / "parts").iterdir())) == -(-N // chunk)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="bug: effective_n_jobs() is the number of cores whatever --workers says, "
-    "effective_n_jobs(None) is meant; with one worker joblib then warns of the timeout",
-)
 def test_one_worker_gives_no_warning(folder: ResultsFolder) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -254,11 +248,6 @@ def test_a_dead_worker_is_a_study_error_and_what_arrived_is_kept(
 
 
 @pytest.mark.usefixtures("fresh_workers")
-@pytest.mark.xfail(
-    strict=True,
-    raises=multiprocessing.TimeoutError,
-    reason="bug: joblib raises multiprocessing.TimeoutError, which is no TimeoutError",
-)
 def test_a_worker_that_hangs_is_a_study_error_and_what_arrived_is_kept(
     folder: ResultsFolder, reference: pd.DataFrame, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -220,21 +220,11 @@ def test_one_replicate_has_no_interval() -> None:
 
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-@pytest.mark.xfail(
-    strict=True,
-    reason="bug: replicates of one sample are dropped and the mean becomes NaN, though a study "
-    "file may say replicate_size = 1",
-)
 def test_replicates_of_one_sample_have_a_mean() -> None:
     values = np.arange(10.0)
     assert statistics.mean(values, np.arange(10)).value == pytest.approx(4.5)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="surprise: the mean of unequal replicates weighs replicates, not samples, so it is not "
-    "the mean of the runs where an output is undefined in some",
-)
 def test_mean_of_unequal_replicates_is_the_mean_of_the_samples() -> None:
     values = np.array([1.0, 2.0, 3.0, 4.0, np.nan, np.nan, 8.0, 9.0])
     described: Any = statistics.describe(values, np.arange(8) // 4)

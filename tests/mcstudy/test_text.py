@@ -32,9 +32,6 @@ def test_number(value: float | None, digits: int, expected: str) -> None:
 
 
 @pytest.mark.parametrize(("value", "expected"), [(9.999, "10.0"), (99.96, "100"), (0.9996, "1.00")])
-@pytest.mark.xfail(
-    strict=True, reason="surprise: what rounds up to the next power of ten gets a digit more"
-)
 def test_number_that_rounds_up_to_a_power_of_ten_keeps_its_digits(
     value: float, expected: str
 ) -> None:
@@ -83,8 +80,5 @@ def test_percent(estimate: tuple[float | None, ...], expected: str) -> None:
     assert text.percent(dict(zip(("value", "low", "high"), estimate, strict=True))) == expected
 
 
-@pytest.mark.xfail(
-    strict=True, reason="surprise: percent prints nan where interval and number do not"
-)
 def test_percent_of_a_share_without_interval() -> None:
     assert text.percent({"value": 0.5, "low": math.nan, "high": math.nan}) == "50.0 %"

@@ -178,24 +178,23 @@ def write_animation(scene: SceneLike, path: Path, *, frames: int = 120) -> None:
         above = figure.add_axes((0.08, 0.5 / height, 0.88, plan_height / height))
         bottom = (0.5 + plan_height + 0.55) / height
         side = figure.add_axes((0.08, bottom, 0.88, side_height / height))
+        side.set(xlim=(low, high), ylim=(-0.1, 2.6), ylabel="height [m]")
+        above.set(xlim=(low, high), ylim=(right, left))
+        above.set(xlabel="x along the road [m]", ylabel="y, left [m]")
         for frame in chosen:
-            for axes in (side, above):
-                axes.clear()
-                axes.set_xlim(low, high)
+            side.set_title(f"t = {1e3 * scene.time[frame]:.0f} ms", loc="left")
+            side.axhline(0.0, color="#333333", linewidth=0.8)
             _draw_car_side(side, scene, float(scene.car[frame, 0]))
             _draw_body(side, scene, frame, (0, 2), (0.0, 0.0))
-            side.axhline(0.0, color="#333333", linewidth=0.8)
-            side.set_ylim(-0.1, 2.6)
-            side.set_ylabel("height [m]")
-            side.set_title(f"t = {1e3 * scene.time[frame]:.0f} ms", loc="left")
             _draw_car_plan(above, scene, frame)
             _draw_body(above, scene, frame, (0, 1), (0.0, 0.0))
-            above.set_ylim(right, left)
-            above.set_xlabel("x along the road [m]")
-            above.set_ylabel("y, left [m]")
             canvas.draw()  # type: ignore[no-untyped-call]
             image = np.asarray(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]
             pictures.append(Image.fromarray(image).quantize(64))
+            # The axes stay, with their ticks; only what moves is drawn anew.
+            for axes in (side, above):
+                for artist in [*axes.lines, *axes.collections, *axes.patches]:
+                    artist.remove()
     path.parent.mkdir(parents=True, exist_ok=True)
     pictures[0].save(
         path, save_all=True, append_images=pictures[1:], duration=60, loop=0, optimize=True

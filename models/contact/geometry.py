@@ -4,7 +4,7 @@ For two convex bodies the signed separation is the largest, over unit directions
 between their supporting planes: ``s(n) = n.d - h1(n) - h2(n)``, with d from the second centre to
 the first and ``h(n) = sqrt(n.A n)`` the support of an ellipsoid of shape matrix
 ``A = R diag(a^2) R^T``. Negative s is penetration. The maximum is found by Newton's method on the
-direction (D. Eberly, Geometric Tools, "Distance Between Two Ellipses"; the support form is the
+direction, halved where it overshoots (D. Eberly, Geometric Tools, "Distance Between Two Ellipses"; the support form is the
 classical one of convex analysis). All symmetric matrices are six scalars: xx, xy, xz, yy, yz, zz.
 """
 
@@ -12,7 +12,7 @@ import math
 
 from models.compilation import inlined_kernel, kernel
 
-ITERATIONS = 20
+ITERATIONS = 60
 TOLERANCE = 1e-5
 """Last Newton turn (rad): the separation is then exact to its square times a semi-axis."""
 
@@ -44,26 +44,31 @@ def roll_direction(d1, d3, p11, p13, p33):
     if length < 1e-12:
         return 1.0, 0.0, -math.sqrt(p11)
     n1, n3 = d1 / length, d3 / length
+    m1, m3, turn, best = n1, n3, 0.0, -math.inf
     for _ in range(ITERATIONS):
         q = p11 * n1 * n1 + 2.0 * p13 * n1 * n3 + p33 * n3 * n3
         h = math.sqrt(q)
-        # Derivatives with respect to the angle of n.
-        q1 = 2.0 * ((p33 - p11) * n1 * n3 + p13 * (n1 * n1 - n3 * n3))
-        q2 = 2.0 * ((p33 - p11) * (n1 * n1 - n3 * n3) - 4.0 * p13 * n1 * n3)
-        slope = -d1 * n3 + d3 * n1 - 0.5 * q1 / h
-        curvature = -d1 * n1 - d3 * n3 - 0.5 * q2 / h + 0.25 * q1 * q1 / (q * h)
-        if curvature < -1e-9:
-            turn = -slope / curvature
-            turn = min(max(turn, -0.5), 0.5)
+        separation = n1 * d1 + n3 * d3 - h
+        if separation < best:
+            # Overshot: half the turn from the best direction so far.
+            turn *= 0.5
         else:
-            turn = 0.3 if slope > 0.0 else -0.3
-        m1, m3 = n1 - turn * n3, n3 + turn * n1
-        scale = 1.0 / math.sqrt(m1 * m1 + m3 * m3)
-        n1, n3 = m1 * scale, m3 * scale
+            best, m1, m3 = separation, n1, n3
+            # Derivatives with respect to the angle of n.
+            q1 = 2.0 * ((p33 - p11) * n1 * n3 + p13 * (n1 * n1 - n3 * n3))
+            q2 = 2.0 * ((p33 - p11) * (n1 * n1 - n3 * n3) - 4.0 * p13 * n1 * n3)
+            slope = -d1 * n3 + d3 * n1 - 0.5 * q1 / h
+            curvature = -d1 * n1 - d3 * n3 - 0.5 * q2 / h + 0.25 * q1 * q1 / (q * h)
+            if curvature < -1e-9:
+                turn = min(max(-slope / curvature, -0.5), 0.5)
+            else:
+                turn = 0.3 if slope > 0.0 else -0.3
         if abs(turn) < TOLERANCE:
             break
-    h = math.sqrt(p11 * n1 * n1 + 2.0 * p13 * n1 * n3 + p33 * n3 * n3)
-    return n1, n3, n1 * d1 + n3 * d3 - h
+        n1, n3 = m1 - turn * m3, m3 + turn * m1
+        scale = 1.0 / math.sqrt(n1 * n1 + n3 * n3)
+        n1, n3 = n1 * scale, n3 * scale
+    return m1, m3, best
 
 
 @kernel
@@ -79,7 +84,8 @@ def ellipsoid_direction(dx, dy, dz, A, B, x, y, z):
         return 0.0, 0.0, 1.0, -math.sqrt(A[5]) - math.sqrt(B[5])
     if x * dx + y * dy + z * dz <= 0.0:
         x, y, z = dx / length, dy / length, dz / length
-    separation = 0.0
+    px, py, pz, best = x, y, z, -math.inf
+    tx, ty, tz, size = 0.0, 0.0, 0.0, 0.0
     for _ in range(ITERATIONS):
         ax = A[0] * x + A[1] * y + A[2] * z
         ay = A[1] * x + A[3] * y + A[4] * z
@@ -90,6 +96,16 @@ def ellipsoid_direction(dx, dy, dz, A, B, x, y, z):
         ha = math.sqrt(ax * x + ay * y + az * z)
         hb = math.sqrt(bx * x + by * y + bz * z)
         separation = dx * x + dy * y + dz * z - ha - hb
+        if separation < best:
+            # Overshot: half the step from the best direction so far.
+            tx, ty, tz, size = 0.5 * tx, 0.5 * ty, 0.5 * tz, 0.5 * size
+            if size < TOLERANCE:
+                break
+            x, y, z = px + tx, py + ty, pz + tz
+            s = 1.0 / math.sqrt(x * x + y * y + z * z)
+            x, y, z = x * s, y * s, z * s
+            continue
+        best, px, py, pz = separation, x, y, z
         gx = dx - ax / ha - bx / hb
         gy = dy - ay / ha - by / hb
         gz = dz - az / ha - bz / hb
@@ -119,15 +135,14 @@ def ellipsoid_direction(dx, dy, dz, A, B, x, y, z):
             su, sv = gu / length, gv / length
         size = math.sqrt(su * su + sv * sv)
         if size > 0.5:
-            su, sv = su * 0.5 / size, sv * 0.5 / size
-        x += su * ux + sv * vx
-        y += su * uy + sv * vy
-        z += su * uz + sv * vz
-        s = 1.0 / math.sqrt(x * x + y * y + z * z)
-        x, y, z = x * s, y * s, z * s
+            su, sv, size = su * 0.5 / size, sv * 0.5 / size, 0.5
         if size < TOLERANCE:
             break
-    return x, y, z, separation
+        tx, ty, tz = su * ux + sv * vx, su * uy + sv * vy, su * uz + sv * vz
+        x, y, z = x + tx, y + ty, z + tz
+        s = 1.0 / math.sqrt(x * x + y * y + z * z)
+        x, y, z = x * s, y * s, z * s
+    return px, py, pz, best
 
 
 @inlined_kernel

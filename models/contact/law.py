@@ -19,7 +19,7 @@ from models.compilation import inlined_kernel, kernel
 
 Array = NDArray[np.float64]
 
-KNOTS = 10
+KNOTS = 16
 """Knots that a combined law can hold."""
 
 DAMPING_ONSET = 0.005
@@ -48,11 +48,13 @@ class ForceCurve:
 
     def __post_init__(self) -> None:
         d, f = self.penetration, self.force
+        if not (np.all(np.isfinite(d)) and np.all(np.isfinite(f))):
+            raise ValueError("the knots of a force curve must be finite")
         if d.ndim != 1 or d.shape != f.shape or not 2 <= d.size <= KNOTS // 2:
             raise ValueError(f"a force curve takes 2 to {KNOTS // 2} knots, given {d.shape}")
         if d[0] != 0.0 or f[0] != 0.0 or np.any(np.diff(d) <= 0.0) or np.any(np.diff(f) <= 0.0):
             raise ValueError("a force curve starts at (0, 0) and rises strictly in both columns")
-        if self.unloading_ratio <= 1.0 or self.damping < 0.0:
+        if not (self.unloading_ratio > 1.0 and self.damping >= 0.0):
             raise ValueError("unloading_ratio must exceed 1 and damping must not be negative")
 
     def scaled(self, force: float = 1.0, penetration: float = 1.0) -> "ForceCurve":
@@ -97,9 +99,10 @@ def combine_curves(surface_d, surface_f, surface_ratio, body_d, body_f, body_rat
         out[n, 1] = force
         out[n, 2] = ds / surface_ratio + db / body_ratio
         out[n, 3] = ds
-        if i < ns and surface_f[i] <= force:
+        # Knots that differ by rounding only are one knot.
+        if i < ns and surface_f[i] <= force * (1.0 + 1e-9):
             i += 1
-        if j < nb and body_f[j] <= force:
+        if j < nb and body_f[j] <= force * (1.0 + 1e-9):
             j += 1
     return n + 1
 

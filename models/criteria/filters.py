@@ -40,8 +40,10 @@ def filter_cfc(signal: ArrayLike, sampling_rate: float, frequency_class: float =
     Raises
     ------
     ValueError
-        If the sampling rate is not above twice the corner frequency.
+        If the class is not positive or the sampling rate not above twice the corner frequency.
     """
+    if not frequency_class > 0.0:
+        raise ValueError(f"the channel frequency class must be positive, given {frequency_class}")
     if sampling_rate <= 2.0 * CUTOFF_FACTOR * frequency_class:
         raise ValueError(
             f"CFC {frequency_class:g} needs a sampling rate above "

@@ -92,8 +92,12 @@ def _free_pair(t, a, s, i, j, window, best):
                 level = q0 / half
             else:
                 continue
-        if level < low or level > high:
+        # A window that ends on a sample has its level at the rim of two cells: rounding must not
+        # put it outside both.
+        slack = 1e-9 * high
+        if level < low - slack or level > high + slack:
             continue
+        level = min(max(level, low), high)
         x1 = t[i] + (level - a[i]) / si
         x2 = t[j] + (level - a[j]) / sj
         if x2 - x1 > window or x2 <= x1:

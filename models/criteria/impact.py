@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from models.criteria.units import STANDARD_GRAVITY
 
 END_OF_CONTACT = 0.05
-"""A contact ends where its force has fallen for good below this share of its peak. The paper does
+"""A contact ends where its force first falls below this share of its peak. The paper does
 not state its rule; 2 to 10 % moves the effective mass of measured dummy impacts by 5 %."""
 
 
@@ -61,12 +61,16 @@ def effective_mass(
         See ``END_OF_CONTACT``.
     """
     t = np.asarray(time, dtype=np.float64)
+    if np.shape(acceleration) != t.shape:
+        raise ValueError("acceleration must match time")
     start, end = contact_window(t, force, end_of_contact)
     if end <= start:
         return math.nan
     part = slice(start, end + 1)
     impulse = np.trapezoid(np.asarray(force, dtype=np.float64)[part], t[part])
     change = np.trapezoid(np.asarray(acceleration, dtype=np.float64)[part], t[part])
+    if change <= 0.0:
+        return math.nan
     return float(impulse / (change * STANDARD_GRAVITY))
 
 

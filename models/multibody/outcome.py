@@ -38,7 +38,12 @@ from models.multibody.surfaces import WORK_CHANNELS
 from models.pedestrian.anthropometry import HEAD, SEGMENTS
 from models.protocol import History, Scene
 from models.vehicle.motion import stopping_distance
-from models.vehicle.profile import hood_edge_distance, static_point, wrap_around_distance
+from models.vehicle.profile import (
+    hood_edge_distance,
+    static_point,
+    surface_point,
+    wrap_around_distance,
+)
 from models.vehicle.zones import ROLL
 
 Array = NDArray[np.float64]
@@ -141,8 +146,8 @@ def _head_contact(raw: Raw, signals: _Signals) -> dict[str, float]:
     if not math.isfinite(contact[0]) or zone < 0:
         return {"head_impact_time": math.nan}
     vehicle, laws = raw.crash.vehicle, raw.crash.ellipsoids
-    point = static_point(vehicle, raw.dive_angle, contact[[7, 9]])
-    wad = wrap_around_distance(vehicle.name, point)
+    surface = surface_point(raw.crash.zones, zone, contact[[7, 9]])
+    wad = wrap_around_distance(vehicle.name, zone, static_point(vehicle, raw.dive_angle, surface))
     law = int(laws.surface_law[HEAD, zone])
     force = np.interp(signals.time, raw.record[:, R_TIME], raw.record[:, R_HEAD_CAR])
     car = slice(0, signals.split)

@@ -36,11 +36,11 @@ REST_TIME = 0.03
 """Time (s) for which both must hold (assumed)."""
 
 HEAD_NEAR = 0.03
-"""Distance (m) from a car zone within which the head is stepped finely (assumed)."""
+"""Distance (m) from a car zone within which a closing head is stepped finely (assumed)."""
 HEAD_SPEED = 1.5
-"""Speed (m/s) relative to the car above which a head near it is stepped finely (assumed)."""
+"""Rearward speed (m/s) relative to the car at which a head near it counts as closing (assumed)."""
 HEAD_FALL = 0.3
-"""Vertical head speed (m/s) at the road above which its contact is stepped finely (assumed)."""
+"""Downward speed (m/s) at which a head near car or road counts as closing (assumed)."""
 HEAD_FORCE = 300.0
 """Head force (N) on car or road above which its contact is stepped finely (assumed)."""
 
@@ -190,35 +190,43 @@ def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts):
     """
     head = settings.head
     reach = ellipsoids.reach[head]
+    cosine, sine = math.cos(car[2]), math.sin(car[2])
     wx, wy = contacts.centre[head, 0] - car[0], contacts.centre[head, 1] - car[1]
-    x = math.cos(car[2]) * wx + math.sin(car[2]) * wy
+    x, y = cosine * wx + sine * wy, abs(cosine * wy - sine * wx)
     z = contacts.centre[head, 2]
     ux = motion.velocity[head, 0] - car[3] + car[5] * wy
     uy = motion.velocity[head, 1] - car[4] - car[5] * wx
-    uz = motion.velocity[head, 2]
-    fast = ux * ux + uy * uy + uz * uz > HEAD_SPEED * HEAD_SPEED
+    fall = -motion.velocity[head, 2]
+    # Closing on the car: downwards onto hood or windscreen, or rearwards into its front.
+    closing = fall > HEAD_FALL or cosine * ux + sine * uy < -HEAD_SPEED
     for j in range(zones.radius.shape[0]):
         if contacts.segment_force[head, j] > HEAD_FORCE:
             return 1
-        if fast and (
+        if closing and (
             x < zones.box[j, 1] + reach + HEAD_NEAR
             and x > zones.box[j, 0] - reach - HEAD_NEAR
             and z < zones.box[j, 3] + reach + HEAD_NEAR
             and z > zones.box[j, 2] - reach - HEAD_NEAR
+            and y < zones.half_width[j] + reach + HEAD_NEAR
         ):
             return 1
     road = contacts.zone_force.shape[0] - 1
-    fall = -motion.velocity[head, 2]
-    if (
-        z - reach < 2.0 * settings.flight * settings.tick * fall + 1e-3 and abs(fall) > HEAD_FALL
-    ) or (contacts.segment_force[head, road] > HEAD_FORCE):
+    ahead = 2.0 * settings.flight * settings.tick
+    if contacts.segment_force[head, road] > HEAD_FORCE:
         return 1
+    if fall > HEAD_FALL and z - reach < ahead * fall + HEAD_NEAR:
+        # Close to the road: the exact gap of the head as it lies.
+        height = 0.0
+        for k in range(3):
+            height += motion.rotation[head, 2, k] ** 2 * ellipsoids.square[head, k]
+        if z - math.sqrt(height) < ahead * fall + 1e-3:
+            return 1
     for j in range(road + 1):
         if contacts.zone_force[j] > 0.0:
             return settings.coarse
     for i in range(motion.centre.shape[0]):
         gap = contacts.centre[i, 2] - ellipsoids.reach[i]
-        if gap < -2.0 * settings.flight * settings.tick * motion.velocity[i, 2] + 1e-3:
+        if gap < -ahead * motion.velocity[i, 2] + 1e-3:
             return settings.coarse
     return settings.flight
 

@@ -13,7 +13,7 @@ Index = NDArray[np.int64]
 
 SLIP_VELOCITY = 0.1
 """Slip (m/s) at which Coulomb friction reaches 71 % of its bound (regularisation, assumed)."""
-SLIP_RATE = 1000.0
+SLIP_RATE = 600.0
 """Largest friction coefficient per segment mass (1/s): keeps the regularised friction of a light
 segment under a hard blow slower than the step (assumed)."""
 

@@ -43,20 +43,7 @@ class Corridor:
         bound = self.lower if coordinate < 0.5 else self.upper
         knots = np.union1d(self.median.penetration, bound.penetration)
         force = (1.0 - share) * self.median.at(knots) + share * bound.at(knots)
-        return _thin(knots, force, self.median)
-
-
-def _thin(penetration: Array, force: Array, like: ForceCurve) -> ForceCurve:
-    """Return a curve of at most five knots, dropping those that bend it least."""
-    while penetration.size > 5:
-        middle = np.interp(penetration[1:-1], penetration[:-2], force[:-2])
-        for k in range(1, penetration.size - 1):
-            a, b = k - 1, k + 1
-            share = (penetration[k] - penetration[a]) / (penetration[b] - penetration[a])
-            middle[k - 1] = (1.0 - share) * force[a] + share * force[b]
-        drop = 1 + int(np.argmin(np.abs(force[1:-1] - middle)))
-        penetration, force = np.delete(penetration, drop), np.delete(force, drop)
-    return ForceCurve(penetration, force, like.unloading_ratio, like.damping)
+        return ForceCurve(knots, force, self.median.unloading_ratio, self.median.damping)
 
 
 @dataclass(frozen=True)
@@ -226,23 +213,25 @@ def static_point(vehicle: Vehicle, dive_angle: float, point: Array) -> Array:
 
 
 @functools.cache
-def wrap_around_line(vehicle_name: str) -> Array:
-    """Return the (k, 2) path (x, z) of a tape drawn tight from the road over the static front.
+def _tape(vehicle_name: str, zone: int) -> Array:
+    """Return the (k, 2) path (x, z) of a tape drawn tight over the zones up to ``zone``.
 
-    It starts on the road under the foremost point and follows the upper convex hull of the zones.
+    It starts on the road under the foremost point and follows the convex hull of the zones from
+    the ground up; of a panel at the end only its front border counts.
     """
     vehicle = load_vehicle(vehicle_name)
     points = []
-    for zone in vehicle.zones:
-        if zone.kind == ROLL:
+    for entry in vehicle.zones[: zone + 1]:
+        if entry.kind == ROLL:
             angle = np.linspace(-math.pi / 2.0, math.pi, 541)
             ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-            points.append(zone.origin + zone.radius * ring)
+            points.append(entry.origin + entry.radius * ring)
         else:
-            points.append(np.array([zone.origin, zone.origin + zone.length * zone.direction]))
+            points.append(np.array([entry.origin, entry.origin + entry.length * entry.direction]))
+    if vehicle.zones[zone].kind != ROLL:
+        points[-1] = points[-1][:1]
     cloud = np.concatenate(points)
-    start = np.array([cloud[:, 0].max(), 0.0])
-    hull = [start]
+    hull = [np.array([cloud[:, 0].max(), 0.0])]
     # Gift wrapping from the road upwards and rearwards.
     heading = math.pi / 2.0
     last = cloud[np.argmin(cloud[:, 0])]
@@ -259,22 +248,38 @@ def wrap_around_line(vehicle_name: str) -> Array:
     return np.array(hull)
 
 
-def wrap_around_distance(vehicle_name: str, point: Array) -> float:
-    """Return the length (m) along the tight tape to the foot of a static point (x, z)."""
-    line = wrap_around_line(vehicle_name)
+def wrap_around_distance(vehicle_name: str, zone: int, point: Array) -> float:
+    """Return the length (m) of a tape drawn tight from the road to a point of a zone.
+
+    Parameters
+    ----------
+    vehicle_name : str
+    zone : row of the zone that holds the point.
+    point : (2,) x and z on the zone's surface, static car.
+    """
+    line = _tape(vehicle_name, zone)
     step = np.diff(line, axis=0)
-    size = np.hypot(step[:, 0], step[:, 1])
-    share = np.clip(np.sum((point - line[:-1]) * step, axis=1) / size**2, 0.0, 1.0)
-    foot = line[:-1] + share[:, None] * step
-    gap = np.hypot(*(point - foot).T)
-    k = int(np.argmin(gap))
-    return float(size[:k].sum() + share[k] * size[k])
+    ahead = np.arctan2(step[:, 1], step[:, 0])
+    direct = np.arctan2(point[1] - line[:, 1], point[0] - line[:, 0])
+    # The tape leaves the hull where the straight way to the point turns less than the hull does.
+    leaves = np.append(direct[:-1] <= ahead + 1e-12, True)
+    k = int(np.argmax(leaves))
+    return float(np.hypot(step[:k, 0], step[:k, 1]).sum() + np.hypot(*(point - line[k])))
+
+
+def surface_point(zones: Zones, zone: int, point: Array) -> Array:
+    """Return the point (x, z) of a zone's undeformed surface that is nearest to a point."""
+    away = np.asarray(point) - zones.origin[zone]
+    if zones.kind[zone] == ROLL:
+        return np.asarray(zones.origin[zone] + zones.radius[zone] * away / np.linalg.norm(away))
+    along = np.clip(away @ zones.direction[zone], 0.0, zones.length[zone])
+    return np.asarray(zones.origin[zone] + along * zones.direction[zone])
 
 
 @functools.cache
 def hood_edge_distance(vehicle_name: str) -> float:
     """Return the wrap-around distance (m) of the hood's leading edge line."""
-    line = wrap_around_line(vehicle_name)
+    line = _tape(vehicle_name, load_vehicle(vehicle_name).zone_index("hood_edge"))
     step = np.diff(line, axis=0)
     slope = np.arctan2(step[:, 1], -step[:, 0])
     first = int(np.argmax(slope <= EDGE_TANGENT))

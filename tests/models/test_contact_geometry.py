@@ -204,7 +204,6 @@ def test_turning_the_scene_turns_the_normal() -> None:
         np.testing.assert_allclose(m, R @ n, atol=1e-6)
 
 
-@pytest.mark.xfail(strict=True, reason="Newton's method circles between two clipped turns")
 def test_slender_ellipsoids() -> None:
     # The project's forearm and its neighbours at random poses, apart or touching; about one pose
     # in 300 is off by up to 45 mm.
@@ -245,7 +244,6 @@ def test_roll_against_a_sphere() -> None:
         assert (n1, n3) == pytest.approx((d1 / distance, d3 / distance), abs=1e-9)
 
 
-@pytest.mark.xfail(strict=True, reason="Newton's method circles between two clipped turns")
 def test_roll_deep_in_a_slender_limb() -> None:
     # A limb of 163 x 29 mm whose surface is 9 mm from the roll's axis (80 mm into a bumper).
     d, P = np.array([0.0129325774, -0.0528278180]), np.zeros((2, 2))

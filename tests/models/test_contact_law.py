@@ -141,10 +141,6 @@ def test_equal_knot_forces_on_both_sides() -> None:
         )
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="two knots at one penetration: the law beyond them is a quotient of roundings",
-)
 def test_knot_forces_that_differ_by_rounding() -> None:
     one = ForceCurve(np.array([0.0, 0.02]), np.array([0.0, 3000.0]), 4.0)
     other = ForceCurve(np.array([0.0, 0.02]), np.array([0.0, np.nextafter(3000.0, 4000.0)]), 4.0)

@@ -253,9 +253,6 @@ def test_continuous_maximum_is_the_global_one(signal: tuple[Array, Array], windo
     assert value == pytest.approx(slow_maximum(time, acceleration, window), rel=1e-9, abs=1e-30)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the level falls between two cells by rounding: 0.13037 instead of 0.14375"
-)
 def test_maximum_whose_end_stands_on_a_sample() -> None:
     # 0.6 mean = 3 for the window from the second sample (a = 3) to where the fall passes 3:
     # length 18/7 ms, mean 5. No better window exists (checked by the slow maximum).

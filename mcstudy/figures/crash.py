@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
@@ -181,24 +182,38 @@ def write_animation(scene: SceneLike, path: Path, *, frames: int = 120) -> None:
         side.set(xlim=(low, high), ylim=(-0.1, 2.6), ylabel="height [m]")
         above.set(xlim=(low, high), ylim=(right, left))
         above.set(xlabel="x along the road [m]", ylabel="y, left [m]")
+        side.fill_between([low, high], -0.1, 0.0, color="#D9D9D9", linewidth=0)
+        # Axes and road are drawn once; each frame draws what moves on a copy of them.
+        canvas.draw()  # type: ignore[no-untyped-call]
+        background = canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]
+        still = {id(artist) for artist in _artists(side, above)}
         for frame in chosen:
-            side.set_title(f"t = {1e3 * scene.time[frame]:.0f} ms", loc="left")
-            side.axhline(0.0, color="#333333", linewidth=0.8)
+            canvas.restore_region(background)  # type: ignore[no-untyped-call]
+            clock = f"t = {1e3 * scene.time[frame]:.0f} ms"
+            side.text(0.0, 1.03, clock, transform=side.transAxes, fontsize=12, clip_on=False)
             _draw_car_side(side, scene, float(scene.car[frame, 0]))
             _draw_body(side, scene, frame, (0, 2), (0.0, 0.0))
             _draw_car_plan(above, scene, frame)
             _draw_body(above, scene, frame, (0, 1), (0.0, 0.0))
-            canvas.draw()  # type: ignore[no-untyped-call]
-            image = np.asarray(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]
-            pictures.append(Image.fromarray(image).quantize(64))
-            # The axes stay, with their ticks; only what moves is drawn anew.
-            for axes in (side, above):
-                for artist in [*axes.lines, *axes.collections, *axes.patches]:
+            for artist in _artists(side, above):
+                if id(artist) not in still:
+                    figure.draw_artist(artist)
                     artist.remove()
+            image = np.asarray(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]
+            pictures.append(Image.fromarray(image).quantize(64, Image.Quantize.FASTOCTREE))
     path.parent.mkdir(parents=True, exist_ok=True)
     pictures[0].save(
         path, save_all=True, append_images=pictures[1:], duration=60, loop=0, optimize=True
     )
+
+
+def _artists(*panels: Axes) -> list[Artist]:
+    """Return lines, patches, collections and texts of the panels, in drawing order."""
+    return [
+        artist
+        for axes in panels
+        for artist in (*axes.patches, *axes.lines, *axes.collections, *axes.texts)
+    ]
 
 
 def _animation_frames(time: Array, count: int) -> list[int]:

@@ -4,8 +4,8 @@ For two convex bodies the signed separation is the largest, over unit directions
 between their supporting planes: ``s(n) = n.d - h1(n) - h2(n)``, with d from the second centre to
 the first and ``h(n) = sqrt(n.A n)`` the support of an ellipsoid of shape matrix
 ``A = R diag(a^2) R^T``. Negative s is penetration. The maximum is found by Newton's method on the
-direction, halved where it overshoots (D. Eberly, Geometric Tools, "Distance Between Two Ellipses"; the support form is the
-classical one of convex analysis). All symmetric matrices are six scalars: xx, xy, xz, yy, yz, zz.
+direction, its step halved where it overshoots. Symmetric matrices are six scalars: xx, xy, xz, yy,
+yz, zz.
 """
 
 import math
@@ -13,7 +13,7 @@ import math
 from models.compilation import inlined_kernel, kernel
 
 ITERATIONS = 60
-TOLERANCE = 1e-5
+TOLERANCE = 1e-7
 """Last Newton turn (rad): the separation is then exact to its square times a semi-axis."""
 
 

@@ -64,8 +64,8 @@ def clip_level(
     a = np.ascontiguousarray(acceleration, dtype=np.float64)
     if t.ndim != 1 or t.shape != a.shape or t.size < 2 or np.any(np.diff(t) <= 0.0):
         raise ValueError("time and acceleration must be equal, 1-D, with time rising strictly")
-    if not (np.all(np.isfinite(t)) and np.all(np.isfinite(a)) and duration > 0.0):
-        raise ValueError("time and acceleration must be finite and duration positive")
+    if not (np.all(np.isfinite(t)) and np.all(np.isfinite(a)) and duration >= 0.0):
+        raise ValueError("time and acceleration must be finite and duration not negative")
     if mode not in ("cumulative", "consecutive"):
         raise ValueError(f"mode must be 'cumulative' or 'consecutive', given {mode!r}")
     if t[-1] - t[0] < duration:

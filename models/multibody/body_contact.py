@@ -3,7 +3,7 @@
 import math
 
 from models.compilation import inlined_kernel
-from models.contact.geometry import ellipsoid_direction, shape_matrix
+from models.contact.geometry import ellipsoid_direction
 from models.contact.law import DAMPING_ONSET, contact_force
 from models.multibody.surfaces import (
     CONTACT_DAMPING,
@@ -13,6 +13,7 @@ from models.multibody.surfaces import (
     friction_coefficient,
     point_velocity,
     push,
+    shape_of,
 )
 
 
@@ -26,13 +27,7 @@ def apply_road_contacts(zones, ellipsoids, motion, loads, contacts, tree, power)
         if contacts.centre[i, 2] > ellipsoids.reach[i]:
             contacts.largest[i, road] = 0.0
             continue
-        R20, R21, R22 = motion.rotation[i, 2, 0], motion.rotation[i, 2, 1], motion.rotation[i, 2, 2]
-        a, b, c = (
-            ellipsoids.square[i, 0] * R20,
-            ellipsoids.square[i, 1] * R21,
-            ellipsoids.square[i, 2] * R22,
-        )
-        h = math.sqrt(a * R20 + b * R21 + c * R22)
+        h = math.sqrt(contacts.shape[i, 5])
         penetration = h - contacts.centre[i, 2]
         if penetration <= 0.0:
             # Flesh recovers once it leaves the road; a car's dent does not.
@@ -40,24 +35,8 @@ def apply_road_contacts(zones, ellipsoids, motion, loads, contacts, tree, power)
             continue
         if penetration > contacts.largest[i, road]:
             contacts.largest[i, road] = penetration
-        px = (
-            contacts.centre[i, 0]
-            - (
-                motion.rotation[i, 0, 0] * a
-                + motion.rotation[i, 0, 1] * b
-                + motion.rotation[i, 0, 2] * c
-            )
-            / h
-        )
-        py = (
-            contacts.centre[i, 1]
-            - (
-                motion.rotation[i, 1, 0] * a
-                + motion.rotation[i, 1, 1] * b
-                + motion.rotation[i, 1, 2] * c
-            )
-            / h
-        )
+        px = contacts.centre[i, 0] - contacts.shape[i, 2] / h
+        py = contacts.centre[i, 1] - contacts.shape[i, 4] / h
         pz = contacts.centre[i, 2] - h
         vx, vy, vz = point_velocity(motion, i, px, py, pz)
         law = ellipsoids.surface_law[i, road]
@@ -94,20 +73,8 @@ def apply_self_contacts(ellipsoids, motion, loads, contacts, tree, power):
         if dx * dx + dy * dy + dz * dz > limit * limit:
             contacts.pair_largest[k] = 0.0
             continue
-        A = shape_matrix(
-            motion.rotation,
-            i,
-            ellipsoids.square[i, 0],
-            ellipsoids.square[i, 1],
-            ellipsoids.square[i, 2],
-        )
-        B = shape_matrix(
-            motion.rotation,
-            j,
-            ellipsoids.square[j, 0],
-            ellipsoids.square[j, 1],
-            ellipsoids.square[j, 2],
-        )
+        A = shape_of(contacts, i)
+        B = shape_of(contacts, j)
         # The last direction gives a lower bound on the separation, mostly enough to go on.
         nx = contacts.pair_normal[k, 0]
         ny = contacts.pair_normal[k, 1]

@@ -7,7 +7,7 @@ contact's worth of force.
 import math
 
 from models.compilation import inlined_kernel
-from models.contact.geometry import roll_direction, shape_matrix
+from models.contact.geometry import roll_direction
 from models.contact.law import DAMPING_ONSET, contact_force
 from models.multibody.surfaces import (
     CAR_NORMAL,
@@ -16,6 +16,7 @@ from models.multibody.surfaces import (
     friction_coefficient,
     point_velocity,
     push,
+    shape_of,
 )
 from models.vehicle.zones import MAXIMUM_DEPTH, ROLL
 
@@ -35,7 +36,7 @@ def _fade(x, border):
 
 
 @inlined_kernel
-def zone_separation(zones, ellipsoids, motion, j, i, cx, cy, cz, cosine, sine):
+def zone_separation(zones, ellipsoids, contacts, j, i, cx, cy, cz, cosine, sine):
     """Return separation, normal, contact point (car frame) and border weight.
 
     Parameters
@@ -79,13 +80,7 @@ def zone_separation(zones, ellipsoids, motion, j, i, cx, cy, cz, cosine, sine):
         ):
             return 1.0, 1.0, 0.0, 0.0, cx, cy, cz, 0.0
     # Shape matrix in car axes: turn the segment's world axes by minus the yaw.
-    A = shape_matrix(
-        motion.rotation,
-        i,
-        ellipsoids.square[i, 0],
-        ellipsoids.square[i, 1],
-        ellipsoids.square[i, 2],
-    )
+    A = shape_of(contacts, i)
     # World components of the car-frame direction (ex, ey, 0).
     gx, gy = cosine * ex - sine * ey, sine * ex + cosine * ey
     p11 = gx * (A[0] * gx + A[1] * gy) + gy * (A[1] * gx + A[3] * gy)
@@ -149,7 +144,7 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
             ):
                 continue
             separation, nx, ny, nz, px, py, pz, weight = zone_separation(
-                zones, ellipsoids, motion, j, i, cx, cy, cz, cosine, sine
+                zones, ellipsoids, contacts, j, i, cx, cy, cz, cosine, sine
             )
             if separation >= 0.0 or weight == 0.0:
                 continue

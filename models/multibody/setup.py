@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from models import data
 from models.compilation import kernel
-from models.contact.geometry import ellipsoid_direction, shape_matrix
+from models.contact.geometry import ellipsoid_direction
 from models.contact.law import KNOTS, ForceCurve, combine_curves
 from models.multibody.car_contact import zone_separation
-from models.multibody.surfaces import Ellipsoids, empty_contacts, update_centres
+from models.multibody.surfaces import Ellipsoids, empty_contacts, shape_of, update_surfaces
 from models.multibody.tree import Motion, Tree, empty_motion, update_kinematics
 from models.pedestrian.anthropometry import PARENTS, SEGMENTS, Body, build_body, region_of
 from models.pedestrian.joints import Joints, build_joints
@@ -74,18 +74,15 @@ def place(posture: Posture) -> Motion:
 def pair_separations(tree, ellipsoids, motion, contacts, out):
     """Write the separation (m) of every self-contact pair."""
     update_kinematics(tree, motion)
-    update_centres(ellipsoids, motion, contacts)
+    update_surfaces(ellipsoids, motion, contacts)
     for k in range(ellipsoids.pairs.shape[0]):
         i, j = ellipsoids.pairs[k, 0], ellipsoids.pairs[k, 1]
-        s = ellipsoids.square
-        A = shape_matrix(motion.rotation, i, s[i, 0], s[i, 1], s[i, 2])
-        B = shape_matrix(motion.rotation, j, s[j, 0], s[j, 1], s[j, 2])
         _, _, _, out[k] = ellipsoid_direction(
             contacts.centre[i, 0] - contacts.centre[j, 0],
             contacts.centre[i, 1] - contacts.centre[j, 1],
             contacts.centre[i, 2] - contacts.centre[j, 2],
-            A,
-            B,
+            shape_of(contacts, i),
+            shape_of(contacts, j),
             0.0,
             0.0,
             0.0,
@@ -93,11 +90,11 @@ def pair_separations(tree, ellipsoids, motion, contacts, out):
 
 
 @kernel
-def _touches(zones, ellipsoids, motion, contacts, shift):
+def _touches(zones, ellipsoids, contacts, shift):
     for i in range(ellipsoids.reach.shape[0]):
         x, y, z = contacts.centre[i, 0] + shift, contacts.centre[i, 1], contacts.centre[i, 2]
         for j in range(zones.radius.shape[0]):
-            found = zone_separation(zones, ellipsoids, motion, j, i, x, y, z, 1.0, 0.0)
+            found = zone_separation(zones, ellipsoids, contacts, j, i, x, y, z, 1.0, 0.0)
             if found[0] < 0.0 and found[7] > 0.0:
                 return True
     return False
@@ -107,16 +104,16 @@ def _touches(zones, ellipsoids, motion, contacts, shift):
 def first_contact_shift(tree, zones, ellipsoids, motion, contacts, ahead, behind):
     """Return the shift in x (m) that makes the body just touch the car, or NaN."""
     update_kinematics(tree, motion)
-    update_centres(ellipsoids, motion, contacts)
+    update_surfaces(ellipsoids, motion, contacts)
     clear, step = ahead, 0.02
-    while not _touches(zones, ellipsoids, motion, contacts, clear - step):
+    while not _touches(zones, ellipsoids, contacts, clear - step):
         clear -= step
         if clear < behind:
             return np.nan
     low, high = clear - step, clear
     for _ in range(40):
         middle = 0.5 * (low + high)
-        if _touches(zones, ellipsoids, motion, contacts, middle):
+        if _touches(zones, ellipsoids, contacts, middle):
             low = middle
         else:
             high = middle

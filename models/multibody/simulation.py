@@ -12,7 +12,7 @@ from models.multibody.body_contact import apply_road_contacts, apply_self_contac
 from models.multibody.car_contact import apply_car_contacts
 from models.multibody.integration import correct, predict
 from models.multibody.joints import FRICTION_RATE, TWIST_FRICTION, apply_joint_torques
-from models.multibody.surfaces import CHANNELS, update_centres
+from models.multibody.surfaces import CHANNELS, update_surfaces
 from models.multibody.tree import (
     Tree,
     centre_acceleration,
@@ -173,7 +173,7 @@ def evaluate(tree, joints, ellipsoids, zones, car, motion, loads, contacts, grav
         loads.torque[i, 0] = 0.0
         loads.torque[i, 1] = 0.0
         loads.torque[i, 2] = 0.0
-    update_centres(ellipsoids, motion, contacts)
+    update_surfaces(ellipsoids, motion, contacts)
     apply_joint_torques(tree, joints, motion, loads, power)
     apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, power)
     apply_road_contacts(zones, ellipsoids, motion, loads, contacts, tree, power)
@@ -214,13 +214,9 @@ def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts):
     ahead = 2.0 * settings.flight * settings.tick
     if contacts.segment_force[head, road] > HEAD_FORCE:
         return 1
-    if fall > HEAD_FALL and z - reach < ahead * fall + HEAD_NEAR:
-        # Close to the road: the exact gap of the head as it lies.
-        height = 0.0
-        for k in range(3):
-            height += motion.rotation[head, 2, k] ** 2 * ellipsoids.square[head, k]
-        if z - math.sqrt(height) < ahead * fall + 1e-3:
-            return 1
+    # The exact gap of the head as it lies.
+    if fall > HEAD_FALL and z - math.sqrt(contacts.shape[head, 5]) < ahead * fall + 1e-3:
+        return 1
     for j in range(road + 1):
         if contacts.zone_force[j] > 0.0:
             return settings.coarse

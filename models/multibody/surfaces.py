@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.compilation import inlined_kernel
+from models.contact.geometry import shape_matrix
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -78,6 +79,7 @@ class Contacts(NamedTuple):
     point : (n, z, 3) m, contact point in the car's frame at this instant.
     normal : (n, z, 3) car-frame normal at this instant (of the nearest approach).
     centre : (n, 3) m, ellipsoid centres, world.
+    shape : (n, 6) m2, shape matrices, world: xx, xy, xz, yy, yz, zz.
     """
 
     largest: Array
@@ -89,6 +91,7 @@ class Contacts(NamedTuple):
     point: Array
     normal: Array
     centre: Array
+    shape: Array
 
 
 def empty_contacts(n: int, z: int, p: int) -> Contacts:
@@ -103,6 +106,7 @@ def empty_contacts(n: int, z: int, p: int) -> Contacts:
         point=np.zeros((n, z, 3)),
         normal=np.zeros((n, z, 3)),
         centre=np.zeros((n, 3)),
+        shape=np.zeros((n, 6)),
     )
 
 
@@ -140,8 +144,8 @@ def friction_coefficient(mu, normal, slip_square, mass):
 
 
 @inlined_kernel
-def update_centres(ellipsoids, motion, contacts):
-    """Fill the ellipsoid centres in world axes."""
+def update_surfaces(ellipsoids, motion, contacts):
+    """Fill the ellipsoids' centres and shape matrices in world axes."""
     for i in range(motion.centre.shape[0]):
         x, y, z = ellipsoids.offset[i, 0], ellipsoids.offset[i, 1], ellipsoids.offset[i, 2]
         for k in range(3):
@@ -151,3 +155,25 @@ def update_centres(ellipsoids, motion, contacts):
                 + motion.rotation[i, k, 1] * y
                 + motion.rotation[i, k, 2] * z
             )
+        A = shape_matrix(
+            motion.rotation,
+            i,
+            ellipsoids.square[i, 0],
+            ellipsoids.square[i, 1],
+            ellipsoids.square[i, 2],
+        )
+        for k in range(6):
+            contacts.shape[i, k] = A[k]
+
+
+@inlined_kernel
+def shape_of(contacts, i):
+    """Return the six entries of the shape matrix of segment ``i`` (m2)."""
+    return (
+        contacts.shape[i, 0],
+        contacts.shape[i, 1],
+        contacts.shape[i, 2],
+        contacts.shape[i, 3],
+        contacts.shape[i, 4],
+        contacts.shape[i, 5],
+    )

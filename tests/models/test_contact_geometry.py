@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from models.contact.geometry import ellipsoid_direction, roll_direction, shape_matrix
 from models.multibody.car_contact import zone_separation
-from models.multibody.surfaces import Ellipsoids
-from models.multibody.tree import Motion, empty_motion
+from models.multibody.surfaces import Contacts, Ellipsoids, empty_contacts
 from models.vehicle.zones import PANEL, ROLL, Zones
 
 Array = NDArray[np.float64]
@@ -205,8 +204,7 @@ def test_turning_the_scene_turns_the_normal() -> None:
 
 
 def test_slender_ellipsoids() -> None:
-    # The project's forearm and its neighbours at random poses, apart or touching; about one pose
-    # in 300 is off by up to 45 mm.
+    # The project's forearm and its neighbours at random poses, apart or touching.
     rng = np.random.default_rng(7)
     semi_axes = [np.array(s) for s in (FOREARM, FOREARM, FOOT)]
     residuals = []
@@ -269,7 +267,7 @@ def one_zone(kind: int, slope: float) -> Zones:
     )
 
 
-def one_ellipsoid(semi_axes: Array, turn: Rotation) -> tuple[Ellipsoids, Motion]:
+def one_ellipsoid(semi_axes: Array, turn: Rotation) -> tuple[Ellipsoids, Contacts]:
     none = np.zeros((1, 1), dtype=np.int64)
     ellipsoids = Ellipsoids(
         square=semi_axes[None, :] ** 2,
@@ -283,9 +281,10 @@ def one_ellipsoid(semi_axes: Array, turn: Rotation) -> tuple[Ellipsoids, Motion]
         pair_gap=np.zeros(0),
         pair_friction=0.0,
     )
-    motion = empty_motion(1)
-    motion.rotation[0] = turn.as_matrix()
-    return ellipsoids, motion
+    contacts = empty_contacts(1, 1, 0)
+    shape = turn.as_matrix() @ np.diag(semi_axes**2) @ turn.as_matrix().T
+    contacts.shape[0] = shape[np.triu_indices(3)]
+    return ellipsoids, contacts
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.3])
@@ -296,13 +295,20 @@ def test_panel_separation_is_that_of_the_lowest_point(yaw: float) -> None:
     to_car = Rotation.from_rotvec([0.0, 0.0, -yaw])
     for _ in range(50):
         semi_axes, turn = random_ellipsoid(rng)
-        ellipsoids, motion = one_ellipsoid(semi_axes, turn)
+        ellipsoids, contacts = one_ellipsoid(semi_axes, turn)
         foot = np.array([-0.2, 0.0, 0.6]) + rng.uniform(0.5, 1.5) * np.array(
             [-math.cos(slope), 0.0, math.sin(slope)]
         )
         centre = foot + [0.0, rng.uniform(-0.5, 0.5), 0.0] + rng.uniform(-0.02, 0.03) * normal
         found = zone_separation(
-            one_zone(PANEL, slope), ellipsoids, motion, 0, 0, *centre, math.cos(yaw), math.sin(yaw)
+            one_zone(PANEL, slope),
+            ellipsoids,
+            contacts,
+            0,
+            0,
+            *centre,
+            math.cos(yaw),
+            math.sin(yaw),
         )
         # Lowest of the surface points centre + R (a u), by optimisation over u.
         in_car = to_car * turn
@@ -328,13 +334,13 @@ def test_roll_separation_is_that_of_the_nearest_point(yaw: float) -> None:
     to_car = Rotation.from_rotvec([0.0, 0.0, -yaw])
     for _ in range(30):
         semi_axes, turn = random_ellipsoid(rng, slenderness=2.5)
-        ellipsoids, motion = one_ellipsoid(semi_axes, turn)
+        ellipsoids, contacts = one_ellipsoid(semi_axes, turn)
         angle = rng.uniform(-1.5, 1.5)
         away = np.array([math.cos(angle), 0.0, math.sin(angle)])
         distance = semi_axes.max() + rng.uniform(0.02, 0.09)
         centre = np.array([-0.2, rng.uniform(-0.5, 0.5), 0.6]) + distance * away
         found = zone_separation(
-            one_zone(ROLL, 0.0), ellipsoids, motion, 0, 0, *centre, math.cos(yaw), math.sin(yaw)
+            one_zone(ROLL, 0.0), ellipsoids, contacts, 0, 0, *centre, math.cos(yaw), math.sin(yaw)
         )
         in_car = to_car * turn
 

@@ -122,6 +122,7 @@ def test_adult_and_suv_come_out_of_the_same_functions() -> None:
         "body_mass": 75.7,
         "head_mass": 4.54,
         "lateral_offset": 0.0,
+        "facing_angle": math.pi / 2.0,
     }
     sedan = MultibodyModel().run(adult)
     assert sedan.status == "ok"

@@ -59,5 +59,5 @@ def test_a_table_without_units_for_a_value_is_refused() -> None:
 def test_a_table_with_a_wrong_unit_is_refused() -> None:
     study = parse_study(CASE.read_text().replace('wad = "m"', 'wad = "kg"'))
     assert isinstance(study, Reconstruction)
-    with pytest.raises(UserError, match="'kg' is needed"):
+    with pytest.raises(UserError, match="unit 'm' measures length"):
         reconstruct(study)

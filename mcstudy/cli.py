@@ -5,7 +5,7 @@ Exit codes: 0 done, 1 the study failed, 2 the user's input is wrong, 130 interru
 
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 from rich.console import Console
@@ -162,22 +162,25 @@ def _print_json(content: dict[str, Any]) -> None:
 def main() -> None:
     """Run the command line and exit."""
     try:
-        app(standalone_mode=False)
+        # Out of standalone mode Typer returns the code of an exit; an interrupt is one with 130.
+        code = app(standalone_mode=False)
     except UserError as error:
         _fail(str(error), 2)
     except StudyError as error:
         _fail(str(error), 1)
     except (KeyboardInterrupt, typer.Abort):
-        _fail("interrupted; what arrived is kept, run the same command again to resume", 130)
+        code = 130
     except Exception as error:
         # Typer's own complaints (unknown option, missing file) carry an exit code and a message.
         if hasattr(error, "exit_code") and hasattr(error, "format_message"):
             _fail(error.format_message(), 2)
         raise
-    sys.exit(0)
+    if code == 130:
+        _fail("interrupted; what arrived is kept, run the same command again to resume", 130)
+    sys.exit(code if isinstance(code, int) else 0)
 
 
-def _fail(message: str, code: int) -> None:
+def _fail(message: str, code: int) -> NoReturn:
     print(f"mcstudy: {message}", file=sys.stderr)
     sys.exit(code)
 

@@ -63,8 +63,9 @@ def _summary(study: MonteCarloStudy, model: Model, analysis: Mapping[str, Any]) 
         q = analysis["outputs"][name]["quantiles"]
         u = unit(unit_of[name])
         lines.append(
-            f"{_title(name)}: median {interval(q['0.5'])} {u}; nine runs in ten lie between "
-            f"{number(q['0.05']['value'])} and {number(q['0.95']['value'])} {u}.".replace(" .", ".")
+            f"{_title(name)}: median {' '.join((interval(q['0.5']), u)).strip()}; nine runs in ten "
+            f"lie between {number(q['0.05']['value'])} and "
+            f"{' '.join((number(q['0.95']['value']), u)).strip()}."
         )
     for name, entries in analysis["exceedance"].items():
         lines += [

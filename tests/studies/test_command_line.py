@@ -1,8 +1,10 @@
 """The command line: exit codes, one-line errors, JSON, resume."""
 
 import json
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -51,6 +53,32 @@ def test_run_status_report_and_resume(tmp_path: Path) -> None:
     rebuilt = mcstudy("report", out)
     assert rebuilt.returncode == 0
     assert "12 runs" in rebuilt.stdout
+
+
+def test_an_interrupt_is_told_and_the_same_command_resumes(tmp_path: Path) -> None:
+    study, out = tmp_path / "small.toml", tmp_path / "out"
+    study.write_text(SMALL.replace("n = 12", "n = 400"))
+    command = [sys.executable, "-m", "mcstudy.cli", "run", study, "--out", out, "--workers", "2"]
+    # Started with the default handler: a shell's background jobs ignore the signal.
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    until = time.monotonic() + 120.0
+    while not list(out.glob("parts/*.parquet")) and time.monotonic() < until:
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "run the same command again to resume" in errors
+    done = json.loads(mcstudy("status", out, "--json").stdout)["done"]
+    assert 0 < done < 400
+    study.write_text(SMALL.replace("n = 12", f"n = {4 * (done // 4 + 1)}"))
+    assert mcstudy("run", study, "--out", out, "--quiet").returncode == 0
+    assert json.loads(mcstudy("status", out, "--json").stdout)["done"] >= done
 
 
 @pytest.mark.parametrize(

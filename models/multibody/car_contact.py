@@ -133,6 +133,11 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
         reach = ellipsoids.reach[i]
         for j in range(count):
             contacts.segment_force[i, j] = 0.0
+        if cx > reach:
+            # Ahead of the foremost point, x = 0.
+            for j in range(count):
+                contacts.engaged[i, j] = False
+            continue
         for j in range(count):
             engaged = contacts.engaged[i, j]
             contacts.engaged[i, j] = False

@@ -5,8 +5,9 @@ gives independent uniforms; a Gaussian copula makes them dependent; the quantile
 values in the file's unit, converted to the model's unit by the caller.
 """
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,51 +103,56 @@ class _Truncated(_Distribution):
         return np.asarray(np.clip(values, self.low, self.high))
 
 
-_TruncatedType = TypeVar("_TruncatedType", bound=_Truncated)
+class _Scored(_Truncated):
+    """A truncated distribution whose normal score depends on the value alone."""
+
+    @model_validator(mode="after")
+    def _some_probability(self) -> "_Scored":
+        if self.high is not None and special.ndtr(self._score(self.high)) < SMALLEST_SHARE:
+            raise ValueError(f"no probability is left below high ({self.high:g})")
+        if self.low is not None and special.ndtr(-self._score(self.low)) < SMALLEST_SHARE:
+            raise ValueError(f"no probability is left above low ({self.low:g})")
+        return self
+
+    @abstractmethod
+    def _score(self, value: float) -> float: ...
+
+    @abstractmethod
+    def _value(self, score: Array) -> Array: ...
+
+    def quantile(self, u: Array, given: Mapping[str, Array]) -> Array:
+        """Return the values at probabilities ``u``."""
+        low = -np.inf if self.low is None else self._score(self.low)
+        high = np.inf if self.high is None else self._score(self.high)
+        return self._bounded(self._value(self._between(u, np.asarray(low), np.asarray(high))))
 
 
-class Normal(_Truncated):
+class Normal(_Scored):
     """Normal, truncated where ``low`` or ``high`` is given."""
 
     distribution: Literal["normal"]
     mean: FiniteFloat
     sd: Positive
 
-    @model_validator(mode="after")
-    def _some_probability(self) -> "Normal":
-        return _check_reach(self, self._score(self.low, -np.inf), self._score(self.high, np.inf))
+    def _score(self, value: float) -> float:
+        return (value - self.mean) / self.sd
 
-    def _score(self, value: float | None, default: float) -> float:
-        return default if value is None else (value - self.mean) / self.sd
-
-    def quantile(self, u: Array, given: Mapping[str, Array]) -> Array:
-        """Return the values at probabilities ``u``."""
-        low = np.asarray(self._score(self.low, -np.inf))
-        high = np.asarray(self._score(self.high, np.inf))
-        return self._bounded(self.mean + self.sd * self._between(u, low, high))
+    def _value(self, score: Array) -> Array:
+        return self.mean + self.sd * score
 
 
-class LogNormal(_Truncated):
+class LogNormal(_Scored):
     """Log-normal by its median and the standard deviation of the logarithm."""
 
     distribution: Literal["lognormal"]
     median: Positive
     sigma: Positive
 
-    @model_validator(mode="after")
-    def _some_probability(self) -> "LogNormal":
-        return _check_reach(self, self._score(self.low, -np.inf), self._score(self.high, np.inf))
-
-    def _score(self, value: float | None, default: float) -> float:
-        if value is None:
-            return default
+    def _score(self, value: float) -> float:
         return float(np.log(value / self.median) / self.sigma) if value > 0.0 else -np.inf
 
-    def quantile(self, u: Array, given: Mapping[str, Array]) -> Array:
-        """Return the values at probabilities ``u``."""
-        low = np.asarray(self._score(self.low, -np.inf))
-        high = np.asarray(self._score(self.high, np.inf))
-        return self._bounded(self.median * np.exp(self.sigma * self._between(u, low, high)))
+    def _value(self, score: Array) -> Array:
+        return np.asarray(self.median * np.exp(self.sigma * score))
 
 
 class GrowthChart(_Truncated):
@@ -208,16 +214,6 @@ class GrowthChart(_Truncated):
         with np.errstate(divide="ignore"):
             values = M * np.where(curved, inside ** (1.0 / power), np.exp(S * z))
         return self._bounded(values)
-
-
-def _check_reach(
-    distribution: _TruncatedType, low_score: float, high_score: float
-) -> _TruncatedType:
-    if special.ndtr(high_score) < SMALLEST_SHARE:
-        raise ValueError(f"no probability is left below high ({distribution.high:g})")
-    if special.ndtr(-low_score) < SMALLEST_SHARE:
-        raise ValueError(f"no probability is left above low ({distribution.low:g})")
-    return distribution
 
 
 Distribution = Annotated[

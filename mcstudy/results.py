@@ -25,6 +25,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from mcstudy.errors import StudyError, UserError
+from mcstudy.simulator import HistoryLike
 
 RUNS = "runs.parquet"
 
@@ -90,6 +91,12 @@ class ResultsFolder:
         """Keep a chunk of runs."""
         first = int(frame["run"].iloc[0])
         self.write_frame(f"parts/part-{first:09d}-{len(frame):06d}.parquet", frame)
+
+    def add_histories(self, run: int, histories: Mapping[str, HistoryLike]) -> None:
+        """Keep the time histories of a run, by group; ``history`` reads them back."""
+        for group, history in histories.items():
+            frame = pd.DataFrame({"time": history.time} | dict(history.channels))
+            self.write_frame(f"{_history_folder(run)}/{group}.parquet", frame)
 
     def compact(self, frame: pd.DataFrame) -> None:
         """Write ``runs.parquet`` and drop the parts."""
@@ -160,7 +167,7 @@ class ResultsFolder:
         UserError
             If the run's histories were not kept.
         """
-        folder = self.path / "histories" / f"run-{run:06d}"
+        folder = self.path / _history_folder(run)
         files = sorted(folder.glob("*.parquet"))
         if not files:
             raise UserError(f"{folder}: no histories were kept for run {run}")
@@ -183,6 +190,10 @@ class ResultsFolder:
                 f"{self.path}: holds another study (it differs in {', '.join(differing[:4])}); "
                 "choose another --out or remove the folder"
             )
+
+
+def _history_folder(run: int) -> str:
+    return f"histories/run-{run:06d}"
 
 
 @contextlib.contextmanager

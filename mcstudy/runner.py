@@ -8,6 +8,7 @@ import multiprocessing
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,12 +101,10 @@ def _run_chunks(task: Task, missing: NDArray[np.int64]) -> Iterable[pd.DataFrame
         raise StudyError(
             f"no chunk came back within {STALL_TIME:g} s; run again to resume"
         ) from None
-    except Exception as error:
-        if type(error).__name__ in ("TerminatedWorkerError", "BrokenProcessPool"):
-            raise StudyError(
-                "a worker process died; what arrived is kept, run again to resume"
-            ) from None
-        raise
+    except BrokenProcessPool:
+        raise StudyError(
+            "a worker process died; what arrived is kept, run again to resume"
+        ) from None
 
 
 def _frame(task: Task, ids: NDArray[np.int64], outputs: Array, status: list[str]) -> pd.DataFrame:

@@ -1,24 +1,10 @@
 """What the methods need to know of a model: a structural type, so that they import no physics."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-
-class InputLike(Protocol):
-    """An input: name, unit, meaning, nominal value and valid range."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def unit(self) -> str: ...
-    @property
-    def meaning(self) -> str: ...
-    @property
-    def nominal(self) -> float: ...
-    @property
-    def low(self) -> float: ...
-    @property
-    def high(self) -> float: ...
+import numpy as np
+from numpy.typing import NDArray
 
 
 class OutputLike(Protocol):
@@ -30,6 +16,26 @@ class OutputLike(Protocol):
     def unit(self) -> str: ...
     @property
     def meaning(self) -> str: ...
+
+
+class InputLike(OutputLike, Protocol):
+    """An input: as an output, with nominal value and valid range."""
+
+    @property
+    def nominal(self) -> float: ...
+    @property
+    def low(self) -> float: ...
+    @property
+    def high(self) -> float: ...
+
+
+class HistoryLike(Protocol):
+    """Time histories: times in s and channels of the same length by name."""
+
+    @property
+    def time(self) -> NDArray[np.float64]: ...
+    @property
+    def channels(self) -> Mapping[str, NDArray[np.float64]]: ...
 
 
 class Simulator(Protocol):

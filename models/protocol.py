@@ -147,6 +147,11 @@ class Model(Protocol):
         """Run (n, inputs) rows."""
 
 
+def complete_status(model: Model) -> frozenset[str]:
+    """Return the statuses of runs that count as complete: ``ok`` and the partial ones."""
+    return frozenset({OK}) | model.partial_status
+
+
 def complete_inputs(model: Model, given: Mapping[str, float]) -> dict[str, float]:
     """Return all inputs by name, nominal where not given.
 

@@ -18,7 +18,7 @@ from mcstudy.figures import distributions, relations, style
 from mcstudy.progress import Progress
 from mcstudy.report import render
 from mcstudy.results import ResultsFolder, check_failures, digest
-from models.protocol import OK, Model
+from models.protocol import Model, complete_status
 from models.registry import load_model
 from studies import evaluation
 from studies.monte_carlo_report import sections_of
@@ -88,7 +88,7 @@ def run_monte_carlo(
         output_names=[item.name for item in model.outputs],
         replicate=np.arange(study.design.n) // study.design.size,
     )
-    complete = frozenset({OK}) | model.partial_status
+    complete = complete_status(model)
     with folder.open_for_writing():
         folder.write_text("study.toml", text)
         manifest = _manifest(study, model, topics, workers)
@@ -166,7 +166,7 @@ def marks_of(study: MonteCarloStudy, model: Model) -> dict[str, list[distributio
 
 def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[str, Any]:
     """Return every number that the report prints."""
-    complete = runs[runs["status"].isin({OK} | model.partial_status)]
+    complete = runs[runs["status"].isin(complete_status(model))]
     groups = None if study.design.method == "monte-carlo" else complete["replicate"].to_numpy()
     marks = marks_of(study, model)
     sampled = list(study.inputs)
@@ -214,7 +214,7 @@ def draw(
     study: MonteCarloStudy, model: Model, runs: pd.DataFrame, analysis: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Return the study's figures by file name."""
-    complete = runs[runs["status"].isin({OK} | model.partial_status)]
+    complete = runs[runs["status"].isin(complete_status(model))]
     unit_of = {item.name: item.unit for item in model.outputs}
     # An output without a value in any run has nothing to draw.
     wanted = {name: unit_of[name] for name in analysis["convergence"]}
@@ -254,9 +254,7 @@ def _keep_histories(
     for k in range(min(study.report.histories, len(runs))):
         row = runs.iloc[k]
         run = model.run({name: float(row[name]) for name in names})
-        for group, history in run.histories.items():
-            frame = pd.DataFrame({"time": history.time} | dict(history.channels))
-            folder.write_frame(f"histories/run-{int(row['run']):06d}/{group}.parquet", frame)
+        folder.add_histories(int(row["run"]), run.histories)
 
 
 def _manifest(

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from mcstudy import config, units
 from mcstudy.config import ComparisonTable, Reconstruction
@@ -13,7 +12,7 @@ from mcstudy.figures import crash, style
 from mcstudy.report import Section, Table, render
 from mcstudy.results import ResultsFolder
 from mcstudy.text import number, quantity, unit
-from models.protocol import OK, Model, Run
+from models.protocol import Model, Run, complete_status
 from studies.monte_carlo import load_study_model
 
 PRIMARY = 0.12
@@ -54,7 +53,7 @@ def reconstruct(study: Reconstruction) -> tuple[Run, list[Comparison]]:
             if unknown:
                 raise UserError(f"tables[{k}].rows[{j}].values.{unknown[0]}: has no unit in units")
     run = model.run(values)
-    if run.status not in {OK} | model.partial_status:
+    if run.status not in complete_status(model):
         raise StudyError(f"the run ended with status {run.status!r}")
     return run, [_compare(table, run, model) for table in study.tables]
 
@@ -134,9 +133,7 @@ def write_reconstruction(
                 "work": {k: float(v[0]) for k, v in run.histories["work"].channels.items()},
             },
         )
-        for group, history in run.histories.items():
-            frame = pd.DataFrame({"time": history.time} | dict(history.channels))
-            folder.write_frame(f"histories/run-000000/{group}.parquet", frame)
+        folder.add_histories(0, run.histories)
         figures = draw(study, run)
         style.save(figures, folder.path / "figures")
         animations = {}

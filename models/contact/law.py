@@ -128,11 +128,11 @@ def contact_force(laws, law, count, damping, onset, penetration, rate, largest):
     damping : N s/m. onset : m, penetration over which damping fades in (0: at once).
     penetration, rate, largest : m, m/s, m; ``largest`` already includes ``penetration``.
     """
-    top = interpolate_law(laws, law, count, 1, largest)
+    top = interpolate_law(laws, law, count, FORCE, largest)
     if penetration >= largest:
         elastic = top
     else:
-        recovery = interpolate_law(laws, law, count, 2, largest)
+        recovery = interpolate_law(laws, law, count, RECOVERY, largest)
         elastic = top * (penetration - largest + recovery) / recovery
         if elastic < 0.0:
             elastic = 0.0

@@ -4,13 +4,13 @@ import math
 
 from models.compilation import inlined_kernel
 from models.contact.geometry import ellipsoid_direction
-from models.contact.law import DAMPING_ONSET, contact_force
 from models.multibody.surfaces import (
     CONTACT_DAMPING,
     FRICTION,
     ROAD_NORMAL,
     SELF_NORMAL,
     friction_coefficient,
+    law_force,
     point_velocity,
     push,
     shape_of,
@@ -40,16 +40,7 @@ def apply_road_contacts(zones, ellipsoids, motion, loads, contacts, tree, power)
         pz = contacts.centre[i, 2] - h
         vx, vy, vz = point_velocity(motion, i, px, py, pz)
         law = ellipsoids.surface_law[i, road]
-        elastic, viscous = contact_force(
-            ellipsoids.laws,
-            law,
-            ellipsoids.counts[law],
-            ellipsoids.damping[law],
-            DAMPING_ONSET,
-            penetration,
-            -vz,
-            contacts.largest[i, road],
-        )
+        elastic, viscous = law_force(ellipsoids, law, penetration, -vz, contacts.largest[i, road])
         normal = elastic + viscous
         slip = vx * vx + vy * vy
         drag = friction_coefficient(mu, normal, slip, tree.mass[i])
@@ -105,16 +96,7 @@ def apply_self_contacts(ellipsoids, motion, loads, contacts, tree, power):
         vx, vy, vz = ix - jx, iy - jy, iz - jz
         rate = -(vx * nx + vy * ny + vz * nz)
         law = ellipsoids.pairs[k, 2]
-        elastic, viscous = contact_force(
-            ellipsoids.laws,
-            law,
-            ellipsoids.counts[law],
-            ellipsoids.damping[law],
-            DAMPING_ONSET,
-            penetration,
-            rate,
-            contacts.pair_largest[k],
-        )
+        elastic, viscous = law_force(ellipsoids, law, penetration, rate, contacts.pair_largest[k])
         normal = elastic + viscous
         tx, ty, tz = vx + rate * nx, vy + rate * ny, vz + rate * nz
         slip = tx * tx + ty * ty + tz * tz

@@ -8,12 +8,12 @@ import math
 
 from models.compilation import inlined_kernel
 from models.contact.geometry import roll_direction
-from models.contact.law import DAMPING_ONSET, contact_force
 from models.multibody.surfaces import (
     CAR_NORMAL,
     CONTACT_DAMPING,
     FRICTION,
     friction_coefficient,
+    law_force,
     point_velocity,
     push,
     shape_of,
@@ -168,16 +168,7 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
             uy = vy - car[4] - car[5] * (qx - car[0])
             rate = -(ux * mx + uy * my + vz * nz)
             law = ellipsoids.surface_law[i, j]
-            elastic, viscous = contact_force(
-                ellipsoids.laws,
-                law,
-                ellipsoids.counts[law],
-                ellipsoids.damping[law],
-                DAMPING_ONSET,
-                penetration,
-                rate,
-                contacts.largest[i, j],
-            )
+            elastic, viscous = law_force(ellipsoids, law, penetration, rate, contacts.largest[i, j])
             elastic *= weight
             viscous *= weight
             normal = elastic + viscous

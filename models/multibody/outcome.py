@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from models.contact.law import interpolate_law
+from models.contact.law import SURFACE, interpolate_law
 from models.criteria import (
     brain_injury_criterion,
     clip_level,
@@ -83,10 +83,9 @@ class _Signals:
     split: int
 
 
-def _signals(raw: Raw, until: float | None = None) -> _Signals:
+def _signals(raw: Raw) -> _Signals:
     record = raw.record
-    end = record[-1, R_TIME] if until is None else min(until, record[-1, R_TIME])
-    time = np.arange(int(end * SAMPLING_RATE) + 1) / SAMPLING_RATE
+    time = np.arange(int(record[-1, R_TIME] * SAMPLING_RATE) + 1) / SAMPLING_RATE
 
     def sampled(first: int) -> Array:
         return np.stack(
@@ -161,7 +160,7 @@ def _head_contact(raw: Raw, signals: _Signals) -> dict[str, float]:
         "wad": wad,
         "head_dent_distance": wad - hood_edge_distance(vehicle.name),
         "hood_intrusion": float(
-            interpolate_law(laws.laws, law, laws.counts[law], 3, raw.summary[S_HEAD_DEPTH])
+            interpolate_law(laws.laws, law, laws.counts[law], SURFACE, raw.summary[S_HEAD_DEPTH])
         ),
     }
 

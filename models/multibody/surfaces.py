@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from models.compilation import inlined_kernel
 from models.contact.geometry import shape_matrix
+from models.contact.law import DAMPING_ONSET, contact_force
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -176,4 +177,19 @@ def shape_of(contacts, i):
         contacts.shape[i, 3],
         contacts.shape[i, 4],
         contacts.shape[i, 5],
+    )
+
+
+@inlined_kernel
+def law_force(ellipsoids, law, penetration, rate, largest):
+    """Return the elastic and the damping force (N) of a contact under combined law ``law``."""
+    return contact_force(
+        ellipsoids.laws,
+        law,
+        ellipsoids.counts[law],
+        ellipsoids.damping[law],
+        DAMPING_ONSET,
+        penetration,
+        rate,
+        largest,
     )

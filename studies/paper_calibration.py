@@ -1,6 +1,7 @@
 """Calibrate what the reference case leaves open to the multibody rows of its Tables 1 and 2.
 
-Calibrated to: throw distance, wrap-around distance, HIC15 and the place of the head's dent.
+Calibrated to: throw distance, wrap-around distance, HIC15 and the place of the head's dent (behind
+the hood edge, inboard of the fender).
 Calibrated inputs, each with a prior from the data sheet: stature (with the mass that goes with
 it), gait phase, facing angle, lateral offset, body-to-car friction, neck stiffness, and a factor
 on the hood's force curve (a position in its corridor, later written into the vehicle file as the
@@ -30,6 +31,7 @@ TARGETS = {
     "wad": (1.32, 0.02),
     "hic15": (1391.0, 70.0),
     "head_dent_distance": (0.58, 0.03),
+    "head_fender_distance": (0.12, 0.03),
 }
 """Multibody row of the case and half of the tolerance that is asked for."""
 

@@ -52,7 +52,8 @@ def zone_separation(zones, ellipsoids, contacts, j, i, cx, cy, cz, cosine, sine)
     """
     half_width = zones.half_width[j]
     reach = ellipsoids.reach[i]
-    if abs(cy) > half_width + reach + BORDER:
+    inner = zones.inner[j]
+    if abs(cy) > half_width + reach + BORDER or abs(cy) < inner - reach - BORDER:
         return 1.0, 1.0, 0.0, 0.0, cx, cy, cz, 0.0
     y = min(max(cy, -half_width), half_width)
     bend = zones.curvature[j] * y
@@ -103,6 +104,8 @@ def zone_separation(zones, ellipsoids, contacts, j, i, cx, cy, cz, cosine, sine)
     py = cy - (-sine * ax + cosine * ay) / h
     pz = cz - az / h
     weight = _fade(half_width - abs(py), BORDER)
+    if inner > 0.0:
+        weight *= _fade(abs(py) - inner, BORDER)
     if zones.kind[j] == ROLL:
         angle = math.atan2(n3, n1)
         weight *= _fade(angle - zones.arc[j, 0], ARC_BORDER)

@@ -159,6 +159,7 @@ def _head_contact(raw: Raw, signals: _Signals) -> dict[str, float]:
         ),
         "wad": wad,
         "head_dent_distance": wad - hood_edge_distance(vehicle.name),
+        "head_fender_distance": vehicle.hood_side - abs(float(contact[8])),
         "hood_intrusion": float(
             interpolate_law(laws.laws, law, laws.counts[law], SURFACE, raw.summary[S_HEAD_DEPTH])
         ),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models import data
-from models.contact.law import ForceCurve
+from models.contact.corridor import Corridor, read_corridor
 from models.vehicle.zones import MAXIMUM_DEPTH, PANEL, ROLL, Zones
 
 Array = NDArray[np.float64]
@@ -16,34 +16,6 @@ Array = NDArray[np.float64]
 EDGE_TANGENT = math.radians(40.0)
 """Slope of the straight edge that marks the hood's leading edge: 50 deg from the vertical
 (EEVC WG17 bonnet leading edge reference line, recalled)."""
-
-
-@dataclass(frozen=True)
-class Corridor:
-    """Lower, median and upper loading curve of a zone."""
-
-    lower: ForceCurve
-    median: ForceCurve
-    upper: ForceCurve
-
-    def curve(self, coordinate: float) -> ForceCurve:
-        """Return the curve at a coordinate: 0 lower, 0.5 median, 1 upper.
-
-        Forces at equal penetration are interpolated linearly, so the curve rises wherever the
-        bounds do.
-
-        Raises
-        ------
-        ValueError
-            If the coordinate is not within 0 to 1.
-        """
-        if not 0.0 <= coordinate <= 1.0:
-            raise ValueError(f"a corridor coordinate lies within 0 and 1, given {coordinate}")
-        share = abs(2.0 * coordinate - 1.0)
-        bound = self.lower if coordinate < 0.5 else self.upper
-        knots = np.union1d(self.median.penetration, bound.penetration)
-        force = (1.0 - share) * self.median.at(knots) + share * bound.at(knots)
-        return ForceCurve(knots, force, self.median.unloading_ratio, self.median.damping)
 
 
 @dataclass(frozen=True)
@@ -58,6 +30,7 @@ class Zone:
     direction: Array
     length: float
     arc: Array
+    inner: float
     half_width: float
     curvature: float
     corridor: Corridor
@@ -71,6 +44,7 @@ class Vehicle:
     ----------
     name, title, source : identification.
     dive_pivot, rotation_centre : m behind the foremost point.
+    hood_side : m, from the centre line to the gap between hood and fender.
     zones : tuple of Zone, from the ground up.
     """
 
@@ -79,6 +53,7 @@ class Vehicle:
     source: str
     dive_pivot: float
     rotation_centre: float
+    hood_side: float
     zones: tuple[Zone, ...]
 
     def zone_index(self, name: str) -> int:
@@ -112,6 +87,7 @@ def load_vehicle(name: str) -> Vehicle:
         source=table["source"],
         dive_pivot=table["dive_pivot"],
         rotation_centre=table["rotation_centre"],
+        hood_side=table["hood_side"],
         zones=tuple(_read_zone(row) for row in table["zones"]),
     )
 
@@ -119,15 +95,6 @@ def load_vehicle(name: str) -> Vehicle:
 def _read_zone(row: dict[str, object]) -> Zone:
     def numbers(key: str) -> Array:
         return np.array(row[key], dtype=np.float64)
-
-    def curve(key: str) -> ForceCurve:
-        knots = numbers(key)
-        return ForceCurve(
-            knots[:, 0].copy(),
-            knots[:, 1].copy(),
-            float(numbers("unloading_ratio")),
-            float(numbers("damping")),
-        )
 
     roll = row["kind"] == "roll"
     origin = numbers("centre" if roll else "start")
@@ -142,9 +109,10 @@ def _read_zone(row: dict[str, object]) -> Zone:
         direction=along / length,
         length=0.0 if roll else length,
         arc=np.radians(numbers("arc")) if roll else np.zeros(2),
+        inner=float(numbers("inner")) if "inner" in row else 0.0,
         half_width=float(numbers("half_width")),
         curvature=float(numbers("curvature")),
-        corridor=Corridor(curve("lower"), curve("median"), curve("upper")),
+        corridor=read_corridor(row),
     )
 
 
@@ -200,6 +168,7 @@ def build_zones(
         direction=direction,
         length=length,
         arc=np.array([z.arc - dive_angle for z in zones]),
+        inner=np.array([z.inner for z in zones]),
         half_width=np.array([z.half_width for z in zones]),
         curvature=np.array([z.curvature for z in zones]),
         box=box,
@@ -221,7 +190,9 @@ def _tape(vehicle_name: str, zone: int) -> Array:
     """
     vehicle = load_vehicle(vehicle_name)
     points = []
-    for entry in vehicle.zones[: zone + 1]:
+    # A side zone lies beside another one in the same side view.
+    below = [entry for entry in vehicle.zones[:zone] if entry.inner == 0.0]
+    for entry in [*below, vehicle.zones[zone]]:
         if entry.kind == ROLL:
             angle = np.linspace(-math.pi / 2.0, math.pi, 541)
             ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)

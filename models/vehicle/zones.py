@@ -2,7 +2,7 @@
 
 The front is a row of *zones* in its own frame (x forward, z up, origin on the road under the
 foremost point): rolls (cylinders across the car: lower bumper, bumper, hood edge) and panels
-(planes: grille, hood, windscreen, roof). Seen from above every zone follows a parabola of the
+(planes: grille, hood, fender sides, windscreen, roof). Seen from above every zone follows a parabola of the
 given curvature.
 """
 
@@ -31,7 +31,9 @@ class Zones(NamedTuple):
     direction : (z, 2) unit vector (x, z) along the panel, front to rear.
     length : (z,) m along the panel.
     arc : (z, 2) rad, lowest and highest direction of the roll's normal, from x towards z.
-    half_width : (z,) m. curvature : (z,) 1/m seen from above.
+    inner, half_width : (z,) m, the zone's borders left and right of the centre line; a zone with
+        ``inner`` above 0 (a fender's side) is a pair of strips.
+    curvature : (z,) 1/m seen from above.
     box : (z, 4) m, lowest and highest x, lowest and highest z that a contact point can have.
     friction : (z + 1,) against the body; the last one is the road's.
     """
@@ -42,6 +44,7 @@ class Zones(NamedTuple):
     direction: Array
     length: Array
     arc: Array
+    inner: Array
     half_width: Array
     curvature: Array
     box: Array

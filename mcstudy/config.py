@@ -47,10 +47,10 @@ class _Table(BaseModel):
 
 
 class ModelChoice(_Table):
-    """``[model]``: name and options such as ``vehicle``."""
+    """``[model]``: name and options such as ``vehicle`` or ``hood_curve``."""
 
     name: str
-    options: dict[str, str] = {}
+    options: dict[str, str | FiniteFloat | list[list[FiniteFloat]]] = {}
 
 
 class Value(_Table):
@@ -106,9 +106,11 @@ class Dependence(_Table):
 
 
 class Report(_Table):
-    """``[report]``: outputs to draw, quantile level of the intervals, references, histories."""
+    """``[report]``: outputs to draw (by default those of the usual three that the model has),
+    references, number of histories kept.
+    """
 
-    outputs: Annotated[list[str], Field(min_length=1)] = ["hic15", "throw_distance", "wad"]
+    outputs: Annotated[list[str], Field(min_length=1)] | None = None
     histories: NonNegativeInt = 8
     references: list[Reference] = []
 
@@ -194,10 +196,11 @@ def parse_study(text: str, source: str = "study") -> Study:
     try:
         return _STUDY.validate_python(table)
     except ValidationError as error:
-        raise UserError(f"{source}: {_first_problem(error)}") from None
+        raise UserError(f"{source}: {first_problem(error)}") from None
 
 
-def _first_problem(error: ValidationError) -> str:
+def first_problem(error: ValidationError) -> str:
+    """Return the first problem of a table, on one line, with its place."""
     problem = error.errors(include_url=False)[0]
     parts = [str(part) for part in problem["loc"]]
     # Pydantic puts the chosen kind of study and of distribution into the place; the file does not.
@@ -293,6 +296,24 @@ def sample_inputs(study: MonteCarloStudy, model: Simulator) -> dict[str, Array]:
         else:
             columns[item.name] = np.full(study.design.n, fixed.get(item.name, item.nominal))
     return columns
+
+
+USUAL_OUTPUTS = ("hic15", "throw_distance", "wad")
+
+
+def report_outputs(study: MonteCarloStudy, model: Simulator) -> list[str]:
+    """Return the outputs that a study's report draws.
+
+    Raises
+    ------
+    UserError
+        If the model lacks one of them.
+    """
+    if study.report.outputs is None:
+        known = [item.name for item in model.outputs]
+        return [name for name in USUAL_OUTPUTS if name in known] or known[:3]
+    check_outputs(study.report.outputs, model, "report.outputs")
+    return study.report.outputs
 
 
 def check_outputs(names: Sequence[str], model: Simulator, place: str) -> None:

@@ -63,6 +63,15 @@ class History:
     units: Mapping[str, str]
 
 
+def history_of(time: Array, channels: Mapping[str, tuple[Array, str]]) -> History:
+    """Return a history of channels given as values and unit by name."""
+    return History(
+        time,
+        {name: values for name, (values, _) in channels.items()},
+        {name: unit for name, (_, unit) in channels.items()},
+    )
+
+
 @dataclass(frozen=True)
 class Scene:
     """What a picture of a run needs.

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from importlib import import_module
+from typing import Any
 
 from models.protocol import Model
 
 # name: module and factory, imported only when asked for.
 _MODELS = {
+    "headform": ("models.headform.model", "HeadformModel"),
     "multibody": ("models.multibody.model", "MultibodyModel"),
 }
 
@@ -16,7 +18,7 @@ def model_names() -> tuple[str, ...]:
     return tuple(_MODELS)
 
 
-def load_model(name: str, options: Mapping[str, str] | None = None) -> Model:
+def load_model(name: str, options: Mapping[str, Any] | None = None) -> Model:
     """Return a model.
 
     Parameters

@@ -2,7 +2,7 @@
 
 import functools
 import json
-from typing import TypedDict
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ class ModelArgument(TypedDict):
     """Plain data that names a model."""
 
     name: str
-    options: dict[str, str]
+    options: dict[str, Any]
 
 
 @functools.lru_cache(maxsize=4)

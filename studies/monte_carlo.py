@@ -74,7 +74,7 @@ def run_monte_carlo(
         If too many runs failed.
     """
     model = load_study_model(study)
-    config.check_outputs(study.report.outputs, model, "report.outputs")
+    config.report_outputs(study, model)
     marks_of(study, model)
     columns = config.sample_inputs(study, model)
     topics = config.numbers_digest(study, model)
@@ -170,6 +170,7 @@ def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[st
     groups = None if study.design.method == "monte-carlo" else complete["replicate"].to_numpy()
     marks = marks_of(study, model)
     sampled = list(study.inputs)
+    wanted = config.report_outputs(study, model)
     analysis: dict[str, Any] = {
         "runs": len(runs),
         "status": {str(k): int(v) for k, v in runs["status"].value_counts().items()},
@@ -181,7 +182,7 @@ def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[st
     for item in model.outputs:
         values = complete[item.name].to_numpy(dtype=float)
         analysis["outputs"][item.name] = {"unit": item.unit} | statistics.describe(values, groups)
-    for name in study.report.outputs:
+    for name in wanted:
         values = complete[name].to_numpy(dtype=float)
         finite = np.isfinite(values)
         part, parts = values[finite], None if groups is None else groups[finite]
@@ -200,10 +201,10 @@ def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[st
                 analysis["observed"].setdefault(name, []).append(entry)
             else:
                 analysis["exceedance"].setdefault(name, []).append(entry)
-    ranks = complete[[*sampled, *study.report.outputs]].corr("spearman")
-    table = ranks.loc[sampled, study.report.outputs]
+    ranks = complete[[*sampled, *wanted]].corr("spearman")
+    table = ranks.loc[sampled, wanted]
     analysis["rank_correlation"] = {
-        name: {k: float(v) for k, v in table[name].items()} for name in study.report.outputs
+        name: {k: float(v) for k, v in table[name].items()} for name in wanted
     }
     # |rho| of unrelated ranks stays below this in 95 of 100 cases.
     analysis["rank_correlation_noise"] = float(1.96 / np.sqrt(max(len(complete) - 1, 1)))

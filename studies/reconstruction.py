@@ -8,7 +8,7 @@ import numpy as np
 from mcstudy import config, units
 from mcstudy.config import ComparisonTable, Reconstruction
 from mcstudy.errors import StudyError, UserError
-from mcstudy.figures import crash, style
+from mcstudy.figures import crash, stiffness, style
 from mcstudy.report import Section, Table, render
 from mcstudy.results import ResultsFolder
 from mcstudy.text import number, quantity, unit
@@ -17,6 +17,38 @@ from studies.monte_carlo import load_study_model
 
 PRIMARY = 0.12
 """s after first contact that the histories show: the impact on the car."""
+
+
+@dataclass(frozen=True)
+class _View:
+    """A history to draw, if a run has it: channels of a group by legend label."""
+
+    group: str
+    channels: dict[str, str]
+    ylabel: str
+    caption: str
+
+
+_VIEWS = {
+    "head_velocity": _View(
+        "head",
+        {"resultant": "velocity_relative_to_car"},
+        "head velocity relative to the car [m/s]",
+        "Velocity of the head's centre of gravity relative to the car.",
+    ),
+    "head_acceleration": _View(
+        "head",
+        {"resultant": "acceleration"},
+        "head acceleration [g]",
+        "Resultant acceleration of the head's centre of gravity, filtered.",
+    ),
+    "head_angular_acceleration": _View(
+        "head",
+        {"resultant, CFC 180": "angular_acceleration"},
+        "head angular acceleration [rad/s²]",
+        "Resultant angular acceleration of the head.",
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -74,26 +106,26 @@ def _compare(table: ComparisonTable, run: Run, model: Model) -> Comparison:
 
 
 def draw(study: Reconstruction, run: Run) -> dict[str, Any]:
-    """Return the figures of a run by file name."""
-    head, contact = run.histories["head"], run.histories["contact_force"]
-    hit = run.outputs["head_impact_time"]
+    """Return the figures of a run by file name: those for which it has histories."""
+    hit = run.outputs.get("head_impact_time", np.nan)
     marks = {"head meets the car": hit} if np.isfinite(hit) else {}
-    figures = {
-        "head_velocity": crash.draw_history(
-            head.time,
-            {"resultant": head.channels["velocity_relative_to_car"]},
-            ylabel="head velocity relative to the car [m/s]",
-            until=PRIMARY,
+    figures: dict[str, Any] = {}
+    if run.scene is not None:
+        figures["kinematics"] = crash.draw_strip(run.scene, study.strip_times)
+    for name, view in _VIEWS.items():
+        history = run.histories.get(view.group)
+        if history is None or not set(view.channels.values()) <= set(history.channels):
+            continue
+        figures[name] = crash.draw_history(
+            history.time,
+            {label: history.channels[channel] for label, channel in view.channels.items()},
+            ylabel=view.ylabel,
+            until=min(PRIMARY, float(history.time[-1])),
             marks=marks,
-        ),
-        "head_acceleration": crash.draw_history(
-            head.time,
-            {"resultant, CFC 1000": head.channels["acceleration"]},
-            ylabel="head acceleration [g]",
-            until=PRIMARY,
-            marks=marks,
-        ),
-        "contact_force": crash.draw_history(
+        )
+    if "contact_force" in run.histories:
+        contact = run.histories["contact_force"]
+        figures["contact_force"] = crash.draw_history(
             contact.time,
             {
                 name.replace("_", " "): values / 1000.0
@@ -102,17 +134,12 @@ def draw(study: Reconstruction, run: Run) -> dict[str, Any]:
             },
             ylabel="contact force, sum over segments [kN]",
             until=PRIMARY,
-        ),
-        "head_angular_acceleration": crash.draw_history(
-            head.time,
-            {"resultant, CFC 180": head.channels["angular_acceleration"]},
-            ylabel="head angular acceleration [rad/s²]",
-            until=PRIMARY,
-            marks=marks,
-        ),
-    }
-    if run.scene is not None:
-        figures = {"kinematics": crash.draw_strip(run.scene, study.strip_times)} | figures
+        )
+    if "hood" in run.histories:
+        hood = run.histories["hood"].channels
+        figures["force_penetration"] = stiffness.draw_force_penetration(
+            {"this run": (hood["penetration"], hood["force"])}
+        )
     return figures
 
 
@@ -130,8 +157,8 @@ def write_reconstruction(
                 "status": run.status,
                 "end_reason": run.end_reason,
                 "outputs": dict(run.outputs),
-                "work": {k: float(v[0]) for k, v in run.histories["work"].channels.items()},
-            },
+            }
+            | _work(run),
         )
         folder.add_histories(0, run.histories)
         figures = draw(study, run)
@@ -152,12 +179,10 @@ def _report(
     figures: dict[str, Any],
     animations: dict[str, bytes],
 ) -> str:
-    captions = {
+    captions = {name: view.caption for name, view in _VIEWS.items()} | {
         "kinematics": "The body from the side, in the car's frame.",
-        "head_velocity": "Velocity of the head's centre of gravity relative to the car.",
-        "head_acceleration": "Resultant acceleration of the head's centre of gravity.",
         "contact_force": "Contact force of each zone of the car.",
-        "head_angular_acceleration": "Resultant angular acceleration of the head.",
+        "force_penetration": "Force of the hood on the headform against penetration.",
     }
     outputs = [
         [item.name, quantity(run.outputs[item.name], item.unit, 4), item.meaning]
@@ -167,25 +192,39 @@ def _report(
         [item.name, quantity(run.inputs[item.name], item.unit, 4), item.source]
         for item in model.inputs
     ]
-    work = [[name.replace("_", " "), f"{values[0]:,.1f}"]
-            for name, values in run.histories["work"].channels.items()]  # fmt: skip
+    numbers = [
+        Table("Outputs", ["output", "value", "meaning"], outputs),
+        Table("Inputs", ["input", "value", "source"], inputs),
+    ]
+    work = _work(run).get("work")
+    if work:
+        numbers.append(
+            Table(
+                "Work on the body by kind; the energy residual is what they leave unexplained.",
+                ["kind", "work [J]"],
+                [[name.replace("_", " "), f"{value:,.1f}"] for name, value in work.items()],
+            )
+        )
+    strip = {captions[name]: figures[name] for name in ("kinematics",) if name in figures}
+    rest = {captions[name]: figure for name, figure in figures.items() if name != "kinematics"}
+    sections = [
+        Section("Beside the published tables", (), [as_table(table) for table in tables]),
+        Section("Kinematics", (), (), strip, animations),
+        Section("Histories", (), (), rest),
+        Section("Numbers", (), numbers),
+    ]
     return render(
         study.title,
-        f"One run of the {model.name} model; it ended with {run.end_reason.replace('_', ' ')} "
-        f"after {run.outputs['crash_duration']:.2f} s.",
-        [
-            Section("Beside the published tables", (), [as_table(table) for table in tables]),
-            Section("Kinematics", (), (), {captions["kinematics"]: figures["kinematics"]}
-                    if "kinematics" in figures else {}, animations),
-            Section("Histories", (), (), {captions[name]: figure for name, figure in figures.items()
-                                          if name != "kinematics"}),
-            Section("Numbers", (), [
-                Table("Outputs", ["output", "value", "meaning"], outputs),
-                Table("Inputs", ["input", "value", "source"], inputs),
-                Table("Work on the body by kind; the energy residual is what they leave "
-                      "unexplained.", ["kind", "work [J]"], work)]),
-        ],
-    )  # fmt: skip
+        f"One run of the {model.name} model; it ended with {run.end_reason.replace('_', ' ')}.",
+        [s for s in sections if s.tables or s.figures or s.animations],
+    )
+
+
+def _work(run: Run) -> dict[str, dict[str, float]]:
+    """Return the work by kind (J), if the model books it."""
+    if "work" not in run.histories:
+        return {}
+    return {"work": {k: float(v[0]) for k, v in run.histories["work"].channels.items()}}
 
 
 def as_table(comparison: Comparison) -> Table:

@@ -3,13 +3,16 @@
 A corridor coordinate from 0 (lower) over 0.5 (median) to 1 (upper) picks a curve between them.
 """
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from models import data
 from models.contact.law import ForceCurve
 
 Array = NDArray[np.float64]
@@ -73,3 +76,109 @@ def read_corridor(row: Mapping[str, Any]) -> Corridor:
             raise ValueError(f"corridor: {key}: {error}") from None
 
     return Corridor(curve("lower"), curve("median"), curve("upper"))
+
+
+def load_corridors(name: str) -> dict[str, Corridor]:
+    """Return the corridors of a data file by zone.
+
+    Parameters
+    ----------
+    name : str
+        A file of the data folder ``corridors``, or the path of a corridor file (``.toml``).
+
+    Raises
+    ------
+    ValueError
+        If there is no such file or something in it is wrong.
+    """
+    try:
+        if name.endswith(".toml"):
+            table = tomllib.loads(Path(name).read_text(encoding="utf-8"))
+        elif name in data.names("corridors"):
+            table = data.load(f"corridors/{name}.toml")
+        else:
+            known = ", ".join(data.names("corridors"))
+            raise ValueError(f"choose one of {known}, or give the path of a .toml file")
+        zones = table.get("zones")
+        if not isinstance(zones, dict) or not all(isinstance(row, dict) for row in zones.values()):
+            raise ValueError("has no tables [zones.<name>]")
+        return {zone: read_corridor(row) for zone, row in zones.items()}
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        raise ValueError(f"corridor {name!r}: {error}") from None
+
+
+LEVEL = 0.9
+"""Share of curves between the bounds of a corridor built from tests."""
+FEWEST_CURVES = 3
+METHODS = ("quantiles", "components")
+
+
+def build_corridor(curves: Sequence[ForceCurve], method: str = "quantiles") -> Corridor:
+    """Return the corridor of a set of measured curves.
+
+    Parameters
+    ----------
+    curves : three or more.
+    method : {"quantiles", "components"}
+        Pointwise quantiles of the forces at equal penetration, or the mean of the logarithms of the
+        forces plus and minus the normal quantile times the first principal component: a
+        stiffer or softer car as a whole.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than three curves or the method is unknown.
+
+    Notes
+    -----
+    Bounds are the 5 and 95 % quantiles. Curves are compared up to the median of their largest
+    penetrations; a shorter one goes on with its last slope.
+    """
+    if method not in METHODS:
+        raise ValueError(f"method must be one of {', '.join(METHODS)}, given {method!r}")
+    if len(curves) < FEWEST_CURVES:
+        raise ValueError(f"a corridor takes {FEWEST_CURVES} or more curves, given {len(curves)}")
+    end = float(np.median([curve.penetration[-1] for curve in curves]))
+    grid = np.linspace(0.0, end, 201)[1:]
+    forces = np.array([curve.at(grid) for curve in curves])
+    tail = 0.5 * (1.0 - LEVEL)
+    if method == "quantiles":
+        bounds = np.quantile(forces, [tail, 0.5, 1.0 - tail], axis=0)
+    else:
+        logs = np.log(forces)
+        mean = logs.mean(axis=0)
+        _, size, shapes = np.linalg.svd(logs - mean, full_matrices=False)
+        reach = special.ndtri(1.0 - tail) * size[0] / np.sqrt(len(curves) - 1.0) * shapes[0]
+        reach *= np.sign(reach.sum()) or 1.0
+        # Exponentials of a sum of shapes need not rise; a law must.
+        bounds = np.maximum.accumulate(np.exp(mean + np.array([[-1.0], [0.0], [1.0]]) * reach), 1)
+    depth = np.concatenate([[0.0], grid])
+    forces = np.pad(bounds, ((0, 0), (1, 0)))
+    knots = choose_knots(depth, forces[1], KNOTS // 2)
+    ratio = float(np.median([curve.unloading_ratio for curve in curves]))
+    return Corridor(*(ForceCurve(knots, fit_loading(depth, f, knots), ratio) for f in forces))
+
+
+def corridor_text(corridor: Corridor, zone: str, title: str, source: str) -> str:
+    """Return a corridor file with one zone; ``load_corridors`` reads it back."""
+
+    def knots(curve: ForceCurve) -> str:
+        pairs = zip(curve.penetration, curve.force, strict=True)
+        return "[" + ", ".join(f"[{d:.6g}, {f:.6g}]" for d, f in pairs) + "]"
+
+    return "\n".join(
+        [
+            "# Stiffness corridor: [penetration m, force N] at the lower, median and upper bound.",
+            "",
+            f"title = {json.dumps(title)}",
+            f"source = {json.dumps(source)}",
+            "",
+            f"[zones.{json.dumps(zone)}]",
+            f"unloading_ratio = {corridor.median.unloading_ratio:.6g}",
+            f"damping = {corridor.median.damping:.6g}",
+            f"lower = {knots(corridor.lower)}",
+            f"median = {knots(corridor.median)}",
+            f"upper = {knots(corridor.upper)}",
+            "",
+        ]
+    )

@@ -107,6 +107,19 @@ def combine_curves(surface_d, surface_f, surface_ratio, body_d, body_f, body_rat
     return n + 1
 
 
+def law_of(curve: ForceCurve, out: Array) -> int:
+    """Write the law of one curve against a rigid body into ``out`` and return its knot count.
+
+    Columns as in ``combine_curves``.
+    """
+    count = curve.penetration.size
+    out[:count, PENETRATION] = curve.penetration
+    out[:count, FORCE] = curve.force
+    out[:count, RECOVERY] = curve.penetration / curve.unloading_ratio
+    out[:count, SURFACE] = curve.penetration
+    return count
+
+
 @inlined_kernel
 def interpolate_law(laws, law, count, column, penetration):
     """Return a column of combined law ``law`` at ``penetration`` (m); the last slope goes on."""

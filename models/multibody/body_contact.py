@@ -3,13 +3,13 @@
 import math
 
 from models.compilation import inlined_kernel
+from models.contact.friction import friction_coefficient
 from models.contact.geometry import ellipsoid_direction
 from models.multibody.surfaces import (
     CONTACT_DAMPING,
     FRICTION,
     ROAD_NORMAL,
     SELF_NORMAL,
-    friction_coefficient,
     law_force,
     point_velocity,
     push,

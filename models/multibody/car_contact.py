@@ -7,12 +7,12 @@ contact's worth of force.
 import math
 
 from models.compilation import inlined_kernel
+from models.contact.friction import friction_coefficient
 from models.contact.geometry import roll_direction
 from models.multibody.surfaces import (
     CAR_NORMAL,
     CONTACT_DAMPING,
     FRICTION,
-    friction_coefficient,
     law_force,
     point_velocity,
     push,

@@ -1,6 +1,5 @@
 """The multibody crash model behind the model protocol."""
 
-import functools
 import math
 from collections.abc import Mapping
 
@@ -8,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models import data
+from models.declaration import named_rows, read_inputs, read_outputs
 from models.multibody import outcome
 from models.multibody.setup import Crash, build_crash
 from models.multibody.simulation import (
@@ -44,25 +44,9 @@ NO_HEAD_CONTACT = "no_head_contact"
 IMPOSSIBLE_BODY = "impossible_body"
 
 
-@functools.cache
-def _table() -> dict[str, object]:
-    return data.load("multibody.toml")
-
-
-@functools.cache
-def _inputs() -> tuple[Input, ...]:
-    rows = data.load("multibody.toml")["inputs"]
-    return tuple(
-        Input(
-            name, r["unit"], r["meaning"], r["nominal"], r["range"][0], r["range"][1], r["source"]
-        )
-        for name, r in rows.items()
-    )
-
-
-@functools.cache
-def _outputs() -> tuple[Output, ...]:
-    return tuple(Output(name, *row) for name, row in data.load("multibody.toml")["outputs"].items())
+_TABLE = data.load("multibody.toml")
+_INPUTS = read_inputs(_TABLE)
+_OUTPUTS = read_outputs(_TABLE)
 
 
 class MultibodyModel:
@@ -97,17 +81,17 @@ class MultibodyModel:
     @property
     def version(self) -> str:
         """Version of the model's data and equations."""
-        return str(_table()["version"])
+        return str(_TABLE["version"])
 
     @property
     def inputs(self) -> tuple[Input, ...]:
         """Inputs in order."""
-        return _inputs()
+        return _INPUTS
 
     @property
     def outputs(self) -> tuple[Output, ...]:
         """Outputs in order."""
-        return _outputs()
+        return _OUTPUTS
 
     def run(self, inputs: Mapping[str, float]) -> Run:
         """Run once, with time histories and scene.
@@ -144,13 +128,10 @@ class MultibodyModel:
             If the array has another number of columns or a value outside its range.
         """
         rows = np.asarray(rows, dtype=np.float64)
-        names = [item.name for item in self.inputs]
-        if rows.ndim != 2 or rows.shape[1] != len(names):
-            raise ValueError(f"rows must have shape (n, {len(names)}), given {rows.shape}")
         table = np.full((rows.shape[0], len(self.outputs)), np.nan)
         status = []
-        for k, row in enumerate(rows):
-            raw = self._simulate(complete_inputs(self, dict(zip(names, row.tolist(), strict=True))))
+        for k, values in enumerate(named_rows(self, rows)):
+            raw = self._simulate(values)
             if isinstance(raw, str):
                 status.append(raw)
                 continue

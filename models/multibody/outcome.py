@@ -36,7 +36,7 @@ from models.multibody.simulation import (
 )
 from models.multibody.surfaces import WORK_CHANNELS
 from models.pedestrian.anthropometry import HEAD, SEGMENTS
-from models.protocol import History, Scene
+from models.protocol import History, Scene, history_of
 from models.vehicle.motion import stopping_distance
 from models.vehicle.profile import (
     hood_edge_distance,
@@ -197,19 +197,11 @@ def histories(raw: Raw) -> dict[str, History]:
     work = {name: (np.array([raw.work[k]]), "J") for k, name in enumerate(WORK_CHANNELS)}
     end = np.array([raw.summary[S_TIME]])
     return {
-        "head": _history(time, head),
-        "contact_force": _history(time, contact),
-        "centre_of_gravity": _history(time, centre),
-        "work": _history(end, work),
+        "head": history_of(time, head),
+        "contact_force": history_of(time, contact),
+        "centre_of_gravity": history_of(time, centre),
+        "work": history_of(end, work),
     }
-
-
-def _history(time: Array, channels: dict[str, tuple[Array, str]]) -> History:
-    return History(
-        time,
-        {name: values for name, (values, _) in channels.items()},
-        {name: unit for name, (_, unit) in channels.items()},
-    )
 
 
 def scene(raw: Raw) -> Scene:

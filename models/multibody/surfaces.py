@@ -1,6 +1,5 @@
 """Contact as loads on the tree: surfaces of the segments, state of the contacts, shared steps."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,12 +11,6 @@ from models.contact.law import DAMPING_ONSET, contact_force
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-
-SLIP_VELOCITY = 0.1
-"""Slip (m/s) at which Coulomb friction reaches 71 % of its bound (regularisation, assumed)."""
-SLIP_RATE = 600.0
-"""Largest friction coefficient per segment mass (1/s): keeps the regularised friction of a light
-segment under a hard blow slower than the step (assumed)."""
 
 # Work channels.
 (
@@ -135,13 +128,6 @@ def point_velocity(motion, i, px, py, pz):
         motion.velocity[i, 1] + wz * rx - wx * rz,
         motion.velocity[i, 2] + wx * ry - wy * rx,
     )
-
-
-@inlined_kernel
-def friction_coefficient(mu, normal, slip_square, mass):
-    """Return regularised Coulomb friction as force over slip (N s/m)."""
-    c = mu * normal / math.sqrt(slip_square + SLIP_VELOCITY * SLIP_VELOCITY)
-    return min(c, SLIP_RATE * mass)
 
 
 @inlined_kernel

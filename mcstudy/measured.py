@@ -1,0 +1,234 @@
+"""Measured data: a folder of tests with recorded inputs, scalars and signals.
+
+::
+
+    measured.toml     what was measured, with units and standard uncertainties
+    tests.csv         one row a test: id, recorded inputs, measured scalars
+    signals/<id>.csv  time (s) and channels of a test
+
+A signal is named after the model's history that it measures, ``<group>_<channel>``, for example
+``head_acceleration``. Folders of ISO-MME tests are read into the same structure.
+"""
+
+import re
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+
+from mcstudy import isomme, units
+from mcstudy.config import first_problem
+from mcstudy.errors import UserError
+from mcstudy.inputs import Distribution
+
+Array = NDArray[np.float64]
+
+FORMAT = "mcstudy-measured/1"
+HEADER = "measured.toml"
+
+FEWEST_SAMPLES = 8
+"""Samples below which a signal cannot be used."""
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Recorded(_Table):
+    """A recorded input or a measured scalar: a column of ``tests.csv``, unit, uncertainty."""
+
+    unit: str = "1"
+    sd: Annotated[FiniteFloat, Field(ge=0.0)] = 0.0
+
+
+class Signal(_Table):
+    """A channel: unit, standard deviation of its white noise after the filter, the filter."""
+
+    unit: str = "1"
+    sd: Annotated[FiniteFloat, Field(ge=0.0)] = 0.0
+    filter: Literal["none", "CFC60", "CFC180", "CFC600", "CFC1000"] = "none"
+
+    @property
+    def channel_class(self) -> float:
+        """Channel frequency class; 0 if the signal is raw."""
+        return 0.0 if self.filter == "none" else float(self.filter.removeprefix("CFC"))
+
+
+class Header(_Table):
+    """``measured.toml``."""
+
+    format: Literal["mcstudy-measured/1"]
+    title: str
+    model: str
+    fixed: dict[str, FiniteFloat | list[list[FiniteFloat]]] = {}
+    uncertain: dict[str, Distribution] = {}
+    inputs: dict[str, Recorded] = {}
+    scalars: dict[str, Recorded] = {}
+    signals: dict[str, Signal] = {}
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Measured tests.
+
+    Attributes
+    ----------
+    source : Path, where they came from.
+    header : Header
+    tests : table, a row a test: ``test`` and the columns of inputs and scalars, in the header's
+        units; NaN where a scalar was not measured.
+    signals : by test and channel, (n, 2) time (s) and value in the channel's unit.
+    """
+
+    source: Path
+    header: Header
+    tests: pd.DataFrame
+    signals: dict[str, dict[str, Array]]
+
+    def input_value(self, name: str, test: int, unit: str) -> tuple[float, float] | None:
+        """Return a recorded input of row ``test`` and its standard uncertainty in ``unit``.
+
+        A value fixed for all tests is exact; None if the input is neither recorded nor fixed.
+
+        Raises
+        ------
+        UserError
+            If the units do not fit.
+        """
+        if name in self.header.inputs:
+            entry = self.header.inputs[name]
+            try:
+                scale = units.factor(entry.unit, unit)
+            except ValueError as error:
+                raise UserError(f"{self.source}: inputs.{name}.unit: {error}") from None
+            return float(self.tests[name].iloc[test]) * scale, entry.sd * scale
+        fixed = self.header.fixed.get(name)
+        return (float(fixed), 0.0) if isinstance(fixed, float | int) else None
+
+    def signal(self, test: str, name: str, unit: str) -> tuple[Array, Array]:
+        """Return time (s) and values in ``unit`` of a channel of a test.
+
+        Raises
+        ------
+        UserError
+            If the test has no such channel or the units do not fit.
+        """
+        if name not in self.signals.get(test, {}):
+            raise UserError(f"{self.source}: test {test!r} has no signal {name!r}")
+        try:
+            scale = units.factor(self.header.signals[name].unit, unit)
+        except ValueError as error:
+            raise UserError(f"{self.source}: signals.{name}.unit: {error}") from None
+        table = self.signals[test][name]
+        return table[:, 0], table[:, 1] * scale
+
+
+def load_measured(folder: Path | str) -> Measured:
+    """Read a folder of measured data: the format above, an ISO-MME test, or a folder of those.
+
+    Raises
+    ------
+    UserError
+        If the folder cannot be read or something in it is wrong; the message names the place.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise UserError(f"{folder}: is no folder of measured data")
+    if (folder / HEADER).exists():
+        return _read_folder(folder)
+    tests = isomme.find_tests(folder)
+    if tests:
+        return _from_isomme(folder, [isomme.read_test(path) for path in tests])
+    raise UserError(f"{folder}: holds neither {HEADER} nor an ISO-MME test (.mme)")
+
+
+def _read_folder(folder: Path) -> Measured:
+    place = folder / HEADER
+    try:
+        table = tomllib.loads(place.read_text(encoding="utf-8"))
+        header = Header.model_validate(table)
+    except ValidationError as error:
+        raise UserError(f"{place}: {first_problem(error)}") from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise UserError(f"{place}: cannot be read ({error})") from None
+    tests = _read_csv(folder / "tests.csv", text=("test",))
+    for column in ("test", *header.inputs, *header.scalars):
+        if column not in tests.columns:
+            raise UserError(f"{folder / 'tests.csv'}: column {column!r} is missing")
+    if tests.empty:
+        raise UserError(f"{folder / 'tests.csv'}: holds no tests")
+    if tests["test"].duplicated().any():
+        raise UserError(f"{folder / 'tests.csv'}: column 'test' repeats an id")
+    for name in header.inputs:
+        if not np.all(np.isfinite(tests[name])):
+            raise UserError(f"{folder / 'tests.csv'}: column {name!r} must be a number in each row")
+    signals: dict[str, dict[str, Array]] = {}
+    for test in tests["test"] if header.signals else ():
+        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,79}", test):
+            raise UserError(f"{folder / 'tests.csv'}: test id {test[:80]!r} cannot name a file")
+        path = folder / "signals" / f"{test}.csv"
+        frame = _read_csv(path)
+        if frame.columns[0] != "time":
+            raise UserError(f"{path}: the first column must be 'time' (s)")
+        signals[test] = {
+            name: _series(path, frame, name) for name in header.signals if name in frame.columns
+        }
+    return Measured(folder, header, tests, signals)
+
+
+def _series(path: Path, frame: pd.DataFrame, name: str) -> Array:
+    """Return time and values of a column where both are given."""
+    table = frame[["time", name]].to_numpy(dtype=float)
+    table = table[np.isfinite(table).all(axis=1)]
+    if len(table) < FEWEST_SAMPLES:
+        raise UserError(f"{path}: column {name!r} has only {len(table)} samples")
+    if np.any(np.diff(table[:, 0]) <= 0.0):
+        raise UserError(f"{path}: time must rise")
+    return table
+
+
+def _read_csv(path: Path, text: tuple[str, ...] = ()) -> pd.DataFrame:
+    try:
+        frame = pd.read_csv(path, dtype=dict.fromkeys(text, str))
+    except (OSError, ValueError) as error:
+        raise UserError(f"{path}: cannot be read ({error})") from None
+    for column in frame.columns:
+        if column not in text:
+            try:
+                frame[column] = pd.to_numeric(frame[column])
+            except (ValueError, TypeError):
+                raise UserError(f"{path}: column {column!r} must hold numbers") from None
+    return frame
+
+
+def _from_isomme(folder: Path, tests: list[isomme.Test]) -> Measured:
+    """Return ISO-MME tests of a headform: speed, mass and head acceleration."""
+    rows, signals = [], {}
+    filters = set()
+    for test in tests:
+        channel = isomme.head_acceleration(test)
+        filters.add(channel.filter)
+        rows.append(
+            {"test": test.name, "impact_speed": test.velocity, "headform_mass": test.mass}
+        )
+        signals[test.name] = {"head_acceleration": np.stack([channel.time, channel.values], 1)}
+    if len(filters) > 1:
+        raise UserError(f"{folder}: head accelerations are filtered differently: {sorted(filters)}")
+    table = pd.DataFrame(rows)
+    if table["test"].duplicated().any():
+        raise UserError(f"{folder}: two ISO-MME tests have the same name")
+    header = Header.model_validate(
+        {
+            "format": FORMAT,
+            "title": tests[0].title or folder.name,
+            "model": "headform",
+            "inputs": {"impact_speed": {"unit": "m/s"}, "headform_mass": {"unit": "kg"}},
+            "signals": {"head_acceleration": {"unit": "g", "filter": filters.pop()}},
+        }
+    )
+    return Measured(folder, header, table, signals)

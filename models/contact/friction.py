@@ -1,0 +1,18 @@
+"""Coulomb friction, regularised so that it has a value at rest."""
+
+import math
+
+from models.compilation import inlined_kernel
+
+SLIP_VELOCITY = 0.1
+"""Slip (m/s) at which Coulomb friction reaches 71 % of its bound (regularisation, assumed)."""
+SLIP_RATE = 600.0
+"""Largest friction coefficient per mass (1/s): keeps the regularised friction of a light body
+under a hard blow slower than the step (assumed)."""
+
+
+@inlined_kernel
+def friction_coefficient(mu, normal, slip_square, mass):
+    """Return regularised Coulomb friction as force over slip (N s/m)."""
+    c = mu * normal / math.sqrt(slip_square + SLIP_VELOCITY * SLIP_VELOCITY)
+    return min(c, SLIP_RATE * mass)

@@ -1,0 +1,330 @@
+"""From the acceleration of a headform to the force-penetration curve of what it struck.
+
+The headform is taken as rigid and as not turning (perpendicular impact), so its acceleration gives
+the force by its mass and, integrated twice, the penetration. A piecewise linear loading curve and
+an unloading line are fitted to force against penetration by least squares. Intervals come from
+repeating the whole chain on the signal with fresh noise, and on speed and mass within their
+uncertainties.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import cumulative_trapezoid
+from scipy.optimize import nnls
+
+from models.contact.law import ForceCurve
+from models.criteria.filters import CUTOFF_FACTOR, filter_cfc
+from models.criteria.units import STANDARD_GRAVITY
+
+Array = NDArray[np.float64]
+
+CHANNEL_CLASS = 1000.0
+"""Channel frequency class of head acceleration (SAE J211)."""
+FLANK = (0.05, 0.25)
+"""Shares of the peak between which the rising flank is taken as straight; its extension to zero is
+first contact (assumed)."""
+QUIET = 0.002
+"""s before the flank from which on a sample no longer counts as before contact (assumed)."""
+FEWEST_QUIET = 10
+"""Samples before contact that offset and noise take at least."""
+UNLOADED = 0.05
+"""Share of the force at the largest penetration below which unloading is not fitted: contact ends
+in the filter's tail (assumed)."""
+SPACING = 0.08
+"""Least distance of knots over the largest penetration."""
+FLATTEST = 1e-3
+"""Least slope of a fitted segment over the secant of the whole curve: a law must rise."""
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Force against penetration of one test.
+
+    Attributes
+    ----------
+    time : (n,) s after first contact. penetration : (n,) m. force : (n,) N.
+    onset : s, first contact on the signal's own time axis.
+    offset, noise : g, mean and standard deviation before contact; NaN if there is no such part.
+    """
+
+    time: Array
+    penetration: Array
+    force: Array
+    onset: float
+    offset: float
+    noise: float
+
+    @property
+    def deepest(self) -> int:
+        """Sample of the largest penetration."""
+        return int(np.argmax(self.penetration))
+
+
+@dataclass(frozen=True)
+class Bounded:
+    """A fitted value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class StiffnessFit:
+    """A fitted law.
+
+    Attributes
+    ----------
+    curve : ForceCurve, with the fitted unloading ratio.
+    force_low, force_high : (k,) N, 95 % interval of the force at each knot.
+    unloading_ratio : 1. permanent : m, where the unloading line meets zero force.
+    loop : Loop, what it was fitted to.
+    residual : N, root mean square over the loading part.
+    """
+
+    curve: ForceCurve
+    force_low: Array
+    force_high: Array
+    unloading_ratio: Bounded
+    permanent: Bounded
+    loop: Loop
+    residual: float
+
+
+def force_penetration(
+    time: ArrayLike, acceleration: ArrayLike, speed: float, mass: float
+) -> Loop:
+    """Return force against penetration from a filtered acceleration.
+
+    Parameters
+    ----------
+    time : (n,) s, rising. acceleration : (n,) g, against the motion, already filtered.
+    speed : m/s at first contact, perpendicular to the surface. mass : kg.
+
+    Raises
+    ------
+    ValueError
+        If the signal has no impact in it, or ends before the headform stops.
+    """
+    t, a = np.asarray(time, dtype=np.float64), np.asarray(acceleration, dtype=np.float64)
+    if t.ndim != 1 or t.shape != a.shape or t.size < 8:
+        raise ValueError(f"time {t.shape} and acceleration {a.shape} must be equal, 8 or more")
+    if not (np.all(np.isfinite(a)) and np.all(np.diff(t) > 0.0)):
+        raise ValueError("the acceleration must be finite and its time must rise")
+    if not (speed > 0.0 and mass > 0.0):
+        raise ValueError("speed and mass must be positive")
+    peak = int(np.argmax(a))
+    if not a[peak] > 0.0:
+        raise ValueError("the signal holds no impact: its largest value is not positive")
+    start = _crossing(t, a, peak, FLANK[0])
+    quiet = a[t < start - QUIET]
+    offset, noise = 0.0, np.nan
+    if quiet.size >= FEWEST_QUIET:
+        offset, noise = float(quiet.mean()), float(quiet.std(ddof=1))
+    a = a - offset
+    low, high = (_crossing(t, a, peak, share) for share in FLANK)
+    onset = low - (high - low) * FLANK[0] / (FLANK[1] - FLANK[0])
+    later = t > onset
+    t = np.concatenate([[onset], t[later]]) - onset
+    a = np.concatenate([[0.0], a[later]])
+    rate = speed - STANDARD_GRAVITY * cumulative_trapezoid(a, t, initial=0.0)
+    depth = cumulative_trapezoid(rate, t, initial=0.0)
+    deepest = int(np.argmax(depth))
+    if deepest >= t.size - 3:
+        raise ValueError(
+            "the signal ends before the headform rebounds: its impulse does not stop "
+            f"{mass:g} kg at {speed:g} m/s (check mass, speed, unit and length)"
+        )
+    force = mass * STANDARD_GRAVITY * a
+    over = np.flatnonzero(force[deepest:] < 0.5 * UNLOADED * force[deepest])
+    end = deepest + int(over[0]) + 1 if over.size else t.size
+    return Loop(t[:end], depth[:end], force[:end], float(onset), offset, noise)
+
+
+def _crossing(t: Array, a: Array, peak: int, share: float) -> float:
+    """Return when the signal last rose through a share of its peak before the peak."""
+    level = share * a[peak]
+    below = np.flatnonzero(a[: peak + 1] < level)
+    if below.size == 0:
+        # The record begins above the level: extend its first rise backwards.
+        k = int(np.argmax(a > a[0]))
+        slope = (a[k] - a[0]) / (t[k] - t[0]) if k else np.inf
+        return float(t[0] - (a[0] - level) / slope)
+    k = int(below[-1])
+    return float(t[k] + (level - a[k]) / (a[k + 1] - a[k]) * (t[k + 1] - t[k]))
+
+
+def fit_stiffness(
+    time: ArrayLike,
+    acceleration: ArrayLike,
+    speed: float,
+    mass: float,
+    *,
+    filtered: bool = False,
+    noise: float = 0.0,
+    speed_sd: float = 0.0,
+    mass_sd: float = 0.0,
+    knots: int = 6,
+    draws: int = 200,
+    seed: int = 0,
+) -> StiffnessFit:
+    """Fit a force-penetration law to the acceleration of a headform.
+
+    Parameters
+    ----------
+    time, acceleration : (n,) s and g, uniform. speed, mass : m/s, kg.
+    filtered : whether the signal has already passed CFC 1000.
+    noise : g, standard deviation of the filtered signal's noise, if known; the noise before
+        contact or the misfit of the fitted curve counts instead where it is larger.
+    speed_sd, mass_sd : standard uncertainties.
+    knots : most knots of the loading curve, 2 to 8; the information criterion may take fewer.
+    draws : repetitions for the intervals. seed : of their noise.
+
+    Raises
+    ------
+    ValueError
+        If the signal cannot be used; the message says why.
+    """
+    t = np.asarray(time, dtype=np.float64)
+    a = np.asarray(acceleration, dtype=np.float64)
+    if t.size < 8 or np.ptp(np.diff(t)) > 1e-3 * np.diff(t).mean():
+        raise ValueError("the signal must be sampled uniformly, 8 samples or more")
+    rate = 1.0 / float(np.diff(t).mean())
+    if not filtered:
+        a = filter_cfc(a, rate, CHANNEL_CLASS)
+    loop = force_penetration(t, a, speed, mass)
+    deepest = loop.deepest
+    places = choose_knots(
+        loop.penetration[: deepest + 1],
+        loop.force[: deepest + 1],
+        knots,
+        independent_samples=2.0 * CUTOFF_FACTOR * CHANNEL_CLASS * loop.time[deepest],
+    )
+    force, ratio = _fit_law(loop, places)
+    misfit = loop.force[: deepest + 1] - np.interp(loop.penetration[: deepest + 1], places, force)
+    residual = float(np.sqrt(np.mean(misfit**2)))
+    level = np.nanmax([noise, loop.noise, residual / (mass * STANDARD_GRAVITY)])
+    rng = np.random.default_rng(seed)
+    repeated = []
+    for _ in range(draws):
+        white = filter_cfc(rng.standard_normal(a.size), rate, min(CHANNEL_CLASS, rate / 4.3))
+        copy = a + level * white / white.std()
+        # Zero-mean draws of speed and mass, kept away from nonsense.
+        v = speed + speed_sd * float(np.clip(rng.standard_normal(), -4.0, 4.0))
+        m = mass + mass_sd * float(np.clip(rng.standard_normal(), -4.0, 4.0))
+        try:
+            again = force_penetration(t, copy, v, m)
+            f, r = _fit_law(again, places)
+        except ValueError:
+            continue
+        depth = again.penetration[again.deepest]
+        repeated.append([*f, r, depth * (1.0 - 1.0 / r)])
+    if draws and len(repeated) < draws / 2:
+        raise ValueError("the signal is too noisy: its curve cannot be repeated with its own noise")
+    depth = loop.penetration[deepest]
+    best = np.array([*force, ratio, depth * (1.0 - 1.0 / ratio)])
+    low, high = np.full(best.size, np.nan), np.full(best.size, np.nan)
+    if repeated:
+        tail = 0.5 * (1.0 - CONFIDENCE)
+        low, high = np.quantile(repeated, [tail, 1.0 - tail], axis=0)
+        # Centred on the fit: a second helping of noise shifts the copies a little.
+        shift = best - np.median(repeated, axis=0)
+        low, high = low + shift, high + shift
+    n = places.size
+    return StiffnessFit(
+        curve=ForceCurve(places, force, ratio),
+        force_low=low[:n],
+        force_high=high[:n],
+        unloading_ratio=Bounded(ratio, float(low[n]), float(high[n])),
+        permanent=Bounded(float(best[n + 1]), float(low[n + 1]), float(high[n + 1])),
+        loop=loop,
+        residual=residual,
+    )
+
+
+def _fit_law(loop: Loop, places: Array) -> tuple[Array, float]:
+    """Return forces at the knots and the unloading ratio of a loop.
+
+    Raises
+    ------
+    ValueError
+        If the loop has no unloading part.
+    """
+    k = loop.deepest
+    force = fit_loading(loop.penetration[: k + 1], loop.force[: k + 1], places)
+    depth = float(loop.penetration[k])
+    top = float(ForceCurve(places, force, 2.0).at(np.array(depth)))
+    falling = slice(k, None)
+    kept = loop.force[falling] > UNLOADED * top
+    back = depth - loop.penetration[falling][kept]
+    drop = top - loop.force[falling][kept]
+    if kept.sum() < 3 or not back @ back > 0.0:
+        raise ValueError("the unloading part has fewer than 3 samples: sample faster")
+    # Line through (depth, top): the orthogonal axis is penetration, so regress it on the force.
+    slope = float(drop @ drop / (drop @ back)) if drop @ back > 0.0 else np.inf
+    return force, max(min(slope * depth / top, 1e3), 1.001)
+
+
+def fit_loading(depth: Array, force: Array, places: Array) -> Array:
+    """Return the forces (N) at the knots of the rising piecewise linear curve of least squares.
+
+    Parameters
+    ----------
+    depth, force : (n,) m and N. places : (k,) m, knots, the first at 0.
+    """
+    # Column j: how far a sample has come in segment j; slopes are non-negative.
+    widths = np.diff(places)
+    basis = np.clip(depth[:, None] - places[:-1], 0.0, widths)
+    basis[:, -1] = np.maximum(depth - places[-2], 0.0)
+    flattest = FLATTEST * float(force.max()) / float(places[-1])
+    slopes, _ = nnls(basis, force - flattest * basis.sum(axis=1))
+    return np.concatenate([[0.0], np.cumsum((slopes + flattest) * widths)])
+
+
+def choose_knots(
+    depth: Array, force: Array, most: int, independent_samples: float | None = None
+) -> Array:
+    """Return knots (m) from 0 to the largest depth that describe a curve.
+
+    Knots are added one by one where they lower the sum of squares most, as long as the Bayesian
+    information criterion falls (G. Schwarz, Ann. Statist. 6, 1978).
+
+    Parameters
+    ----------
+    depth, force : (n,) m and N.
+    most : knots at most, 2 to 8.
+    independent_samples : how many samples count; by default all. Filtered samples are correlated.
+
+    Raises
+    ------
+    ValueError
+        If ``most`` is not within 2 to 8.
+    """
+    if not 2 <= most <= 8:
+        raise ValueError(f"a loading curve has 2 to 8 knots, given {most}")
+    n = max(float(independent_samples or depth.size), 4.0)
+    end = float(depth.max())
+    candidates = end * np.arange(SPACING, 1.0 - 0.5 * SPACING, 0.5 * SPACING)
+    places = np.array([0.0, end])
+
+    def squares(knots: Array) -> float:
+        fitted = np.interp(depth, knots, fit_loading(depth, force, knots))
+        return float(np.mean((force - fitted) ** 2)) + (1e-6 * float(force.max())) ** 2
+
+    score = n * np.log(squares(places))
+    while places.size < most:
+        free = [c for c in candidates if np.abs(places - c).min() >= SPACING * end * 0.999]
+        if not free:
+            break
+        trials = [np.sort(np.append(places, c)) for c in free]
+        found = [squares(trial) for trial in trials]
+        best = int(np.argmin(found))
+        # A knot costs two parameters: where it lies and its force.
+        trial_score = n * np.log(found[best]) + 2.0 * np.log(n) * (places.size - 1)
+        if trial_score >= score:
+            break
+        places, score = trials[best], trial_score
+    return places

@@ -1,0 +1,364 @@
+"""The headform impactor test behind the model protocol."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models import data
+from models.contact.corridor import Corridor, load_corridors
+from models.contact.law import (
+    DAMPING_ONSET,
+    KNOTS,
+    SURFACE,
+    ForceCurve,
+    combine_curves,
+    interpolate_law,
+    law_of,
+)
+from models.criteria import clip_level, filter_cfc, head_injury_criterion
+from models.criteria.units import STANDARD_GRAVITY
+from models.declaration import named_rows, read_inputs, read_outputs
+from models.headform.impact import (
+    COLUMNS,
+    DEEPEST,
+    END_TIME,
+    NORMAL,
+    PENETRATION,
+    RATE,
+    REBOUND,
+    SAMPLES,
+    SLIDE,
+    SPENT,
+    SPIN,
+    SUMMARY,
+    TANGENTIAL,
+    Impactor,
+    Surface,
+    strike,
+)
+from models.protocol import (
+    OK,
+    Batch,
+    History,
+    Input,
+    Output,
+    Run,
+    complete_inputs,
+    history_of,
+)
+from models.vehicle.profile import load_vehicle
+
+Array = NDArray[np.float64]
+
+SAMPLING_RATE = 20_000.0
+"""Hz of the accelerometer (SAE J211 asks for ten times the channel frequency class)."""
+QUIET = 0.005
+"""s of flight kept before and after the contact, so that the filter has room."""
+LONGEST_CONTACT = 1.0
+"""s of contact after which a run counts as failed."""
+FINEST = 5
+"""Steps a sample, at least."""
+PHASE = 0.05
+"""Largest step times the highest natural frequency of the contact (1 is a radian)."""
+MOST_STEPS = 4000
+"""Steps a sample, at most."""
+
+TIME_LIMIT = "time_limit"
+NOT_FINITE = "not_finite"
+
+_TABLE = data.load("headform.toml")
+_OUTPUTS = read_outputs(_TABLE)
+
+
+def headform_names() -> tuple[str, ...]:
+    """Return the names of the headforms in the data file."""
+    return tuple(data.load("headforms.toml")["headforms"])
+
+
+@dataclass(frozen=True)
+class _Test:
+    """One test: impactor, laws, initial speeds and what the loop left behind."""
+
+    impactor: Impactor
+    speeds: tuple[float, float]
+    record: Array
+    summary: Array
+    dent: tuple[float, float]
+
+
+class HeadformModel:
+    """A free headform against one point of a car's front.
+
+    The struck zone is given in one of three ways: its loading curve, a corridor of a data file, or
+    a zone of a vehicle.
+
+    Parameters
+    ----------
+    headform : str
+        ``eevc_child``, ``eevc_adult``, ``gtr_child`` or ``gtr_adult``: nominal mass, diameter,
+        inertia.
+    hood_curve : sequence of pairs, optional
+        Knots (penetration m, force N) from (0, 0), straight beyond the last; the input
+        ``hood_stiffness`` has no meaning then and is left out.
+    corridor : str, optional
+        Name of a corridor of the data folder, or path of a corridor file (``.toml``).
+    vehicle : str, optional
+        Name of a vehicle; by default the family car if neither curve nor corridor is given.
+    zone : str
+        Zone of the corridor or vehicle.
+    skin : {"rigid", "vinyl"}
+        Whether the headform's skin deforms; the case's paper found it negligible on a hood.
+    channel_class : float
+        Channel frequency class of the accelerometer; 0 leaves the signal as it is.
+
+    Raises
+    ------
+    ValueError
+        If an option is unknown or contradicts another.
+    """
+
+    name = "headform"
+    effects: tuple[str, ...] = ()
+    partial_status: frozenset[str] = frozenset()
+
+    def __init__(
+        self,
+        headform: str = "eevc_child",
+        hood_curve: Sequence[Sequence[float]] | None = None,
+        corridor: str | None = None,
+        vehicle: str | None = None,
+        zone: str = "hood",
+        skin: str = "rigid",
+        channel_class: float = 1000.0,
+    ) -> None:
+        if headform not in headform_names():
+            raise ValueError(
+                f"no headform {headform!r}: choose one of {', '.join(headform_names())}"
+            )
+        if sum(option is not None for option in (hood_curve, corridor, vehicle)) > 1:
+            raise ValueError("give one of hood_curve, corridor and vehicle, not several")
+        if skin not in ("rigid", "vinyl"):
+            raise ValueError(f"skin must be 'rigid' or 'vinyl', given {skin!r}")
+        self.channel_class = float(channel_class)
+        if not 0.0 <= self.channel_class < SAMPLING_RATE / 4.2:
+            raise ValueError(f"channel_class must lie within 0 and 4700, given {channel_class}")
+        row = data.load("headforms.toml")["headforms"][headform]
+        self._gyration = row["inertia"] / (row["mass"] * (0.5 * row["diameter"]) ** 2)
+        self._skin = _skin() if skin == "vinyl" else None
+        nominal = {"headform_mass": row["mass"], "headform_diameter": row["diameter"]}
+        self._curve: ForceCurve | None = None
+        self._corridor: Corridor | None = None
+        if hood_curve is not None:
+            self._curve = _curve_of(hood_curve)
+        else:
+            self._corridor = _corridor_of(corridor, vehicle, zone)
+            median = self._corridor.median
+            nominal |= {
+                "hood_unloading_ratio": median.unloading_ratio,
+                "hood_damping": median.damping,
+                "hood_damping_onset": DAMPING_ONSET if median.damping > 0.0 else 0.0,
+            }
+        self._inputs = tuple(
+            replace(item, nominal=float(nominal.get(item.name, item.nominal)))
+            for item in read_inputs(_TABLE)
+            if self._corridor is not None or item.name != "hood_stiffness"
+        )
+
+    @property
+    def version(self) -> str:
+        """Version of the model's data and equations."""
+        return str(_TABLE["version"])
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """Inputs in order."""
+        return self._inputs
+
+    @property
+    def outputs(self) -> tuple[Output, ...]:
+        """Outputs in order."""
+        return _OUTPUTS
+
+    def run(self, inputs: Mapping[str, float]) -> Run:
+        """Run once, with time histories.
+
+        Raises
+        ------
+        ValueError
+            If an input is unknown or outside its range.
+        """
+        values = complete_inputs(self, inputs)
+        test = self._strike(values)
+        status, outputs = self._judge(test)
+        ended = "separation" if status == OK else status
+        return Run(values, status, ended, outputs, self._histories(test))
+
+    def run_batch(self, rows: Array) -> Batch:
+        """Run rows of inputs.
+
+        Parameters
+        ----------
+        rows : (n, inputs) in the order of ``inputs``, SI units.
+
+        Raises
+        ------
+        ValueError
+            If the array has another number of columns or a value outside its range.
+        """
+        rows = np.asarray(rows, dtype=np.float64)
+        table = np.full((rows.shape[0], len(_OUTPUTS)), np.nan)
+        status = []
+        for k, values in enumerate(named_rows(self, rows)):
+            word, outputs = self._judge(self._strike(values))
+            status.append(word)
+            table[k] = [outputs[item.name] for item in _OUTPUTS]
+        return Batch(table, status)
+
+    def hood_curve(self, values: Mapping[str, float]) -> ForceCurve:
+        """Return the loading curve struck for inputs by name (all of them)."""
+        if self._corridor is not None:
+            curve = self._corridor.curve(values["hood_stiffness"])
+        else:
+            assert self._curve is not None
+            curve = self._curve
+        return ForceCurve(
+            curve.penetration,
+            curve.force * values["hood_force_scale"],
+            values["hood_unloading_ratio"],
+            values["hood_damping"],
+        )
+
+    def _strike(self, values: Mapping[str, float]) -> _Test:
+        curve = self.hood_curve(values)
+        laws = np.zeros((1, KNOTS, 4))
+        if self._skin is None:
+            count = law_of(curve, laws[0])
+        else:
+            count = combine_curves(
+                curve.penetration, curve.force, curve.unloading_ratio,
+                self._skin.penetration, self._skin.force, self._skin.unloading_ratio, laws[0],
+            )  # fmt: skip
+        mass, radius = values["headform_mass"], 0.5 * values["headform_diameter"]
+        impactor = Impactor(mass, self._gyration * mass * radius**2, radius)
+        # The stiffest the contact gets: unloading from a knot, or from beyond the last one.
+        secant = curve.force[1:] / curve.penetration[1:]
+        slope = np.diff(curve.force) / np.diff(curve.penetration)
+        stiffest = max(curve.unloading_ratio * max(secant.max(), slope[-1]), slope.max())
+        frequency = math.sqrt(stiffest / mass)
+        stride = math.ceil(frequency / (PHASE * SAMPLING_RATE))
+        stride = min(max(stride, FINEST), MOST_STEPS)
+        speed, angle = values["impact_speed"], values["impact_angle"]
+        speeds = (speed * math.cos(angle), speed * math.sin(angle))
+        record = np.empty((round(LONGEST_CONTACT * SAMPLING_RATE), COLUMNS))
+        summary = np.zeros(SUMMARY)
+        strike(
+            impactor,
+            Surface(values["friction_body_car"], curve.damping, values["hood_damping_onset"]),
+            laws, count, *speeds, 1.0 / (SAMPLING_RATE * stride), stride, record, summary,
+        )  # fmt: skip
+        deepest = summary[DEEPEST]
+        hood = float(interpolate_law(laws, 0, count, SURFACE, deepest))
+        return _Test(
+            impactor=impactor,
+            speeds=speeds,
+            record=record[: int(summary[SAMPLES])].copy(),
+            summary=summary,
+            dent=(hood, hood * (1.0 - 1.0 / curve.unloading_ratio)),
+        )
+
+    def _acceleration(self, test: _Test) -> Array:
+        """Return normal and tangential acceleration (g) with flight before and after, filtered."""
+        quiet = round(QUIET * SAMPLING_RATE)
+        forces = test.record[:, [NORMAL, TANGENTIAL]] / (test.impactor.mass * STANDARD_GRAVITY)
+        padded = np.pad(forces, ((quiet, quiet), (0, 0)))
+        if self.channel_class == 0.0:
+            return padded
+        return filter_cfc(padded, SAMPLING_RATE, self.channel_class)
+
+    def _judge(self, test: _Test) -> tuple[str, dict[str, float]]:
+        """Return the status of a test and its outputs."""
+        empty = dict.fromkeys((item.name for item in _OUTPUTS), math.nan)
+        if not np.all(np.isfinite(test.record)):
+            return NOT_FINITE, empty
+        if math.isnan(test.summary[END_TIME]):
+            return TIME_LIMIT, empty
+        acceleration = np.hypot(*self._acceleration(test).T)
+        time = np.arange(acceleration.size) / SAMPLING_RATE
+        energy = 0.5 * test.impactor.mass * (test.speeds[0] ** 2 + test.speeds[1] ** 2)
+        record, summary = test.record, test.summary
+        left = 0.5 * test.impactor.mass * (summary[REBOUND] ** 2 + record[-1, SLIDE] ** 2)
+        left += 0.5 * test.impactor.inertia * record[-1, SPIN] ** 2
+        return OK, {
+            "hic15": head_injury_criterion(time, acceleration, 0.015)[0],
+            "hic36": head_injury_criterion(time, acceleration, 0.036)[0],
+            "clip_3ms": clip_level(time, acceleration),
+            "clip_3ms_consecutive": clip_level(time, acceleration, mode="consecutive"),
+            "peak_head_acceleration": float(acceleration.max()),
+            "peak_force": float(record[:, NORMAL].max()),
+            "hood_intrusion": test.dent[0],
+            "permanent_dent": test.dent[1],
+            "rebound_speed": float(summary[REBOUND]),
+            "contact_duration": float(summary[END_TIME]),
+            "head_angular_velocity": float(np.abs(record[:, SPIN]).max()),
+            "energy_residual": float((energy - summary[SPENT] - left) / energy),
+        }
+
+    def _histories(self, test: _Test) -> dict[str, History]:
+        """Return the histories of headform and hood; time 0 is first contact."""
+        quiet = round(QUIET * SAMPLING_RATE)
+        record, last = test.record, test.record[-1]
+        acceleration = self._acceleration(test)
+        before = np.arange(-quiet, 0) / SAMPLING_RATE
+        after = np.arange(1, quiet + 1) / SAMPLING_RATE
+        rate, slide = test.speeds
+
+        def padded(column: int, first: float, end: float) -> Array:
+            return np.pad(record[:, column], quiet, constant_values=(first, end))
+
+        depth = np.concatenate(
+            [before * rate, record[:, PENETRATION], last[PENETRATION] + after * last[RATE]]
+        )
+        time = np.arange(-quiet, record.shape[0] + quiet) / SAMPLING_RATE
+        head = {
+            "acceleration": (np.hypot(*acceleration.T), "g"),
+            "acceleration_normal": (acceleration[:, 0], "g"),
+            "acceleration_tangential": (acceleration[:, 1], "g"),
+            "velocity_normal": (padded(RATE, rate, last[RATE]), "m/s"),
+            "velocity_tangential": (padded(SLIDE, slide, last[SLIDE]), "m/s"),
+            "angular_velocity": (padded(SPIN, 0.0, last[SPIN]), "rad/s"),
+        }
+        hood = {"force": (padded(NORMAL, 0.0, 0.0), "N"), "penetration": (depth, "m")}
+        return {"head": history_of(time, head), "hood": history_of(time, hood)}
+
+
+def _skin() -> ForceCurve:
+    row = data.load("headforms.toml")["skin"]
+    knots = np.array(row["curve"])
+    return ForceCurve(knots[:, 0].copy(), knots[:, 1].copy(), row["unloading_ratio"])
+
+
+def _curve_of(knots: Sequence[Sequence[float]]) -> ForceCurve:
+    try:
+        table = np.array(knots, dtype=np.float64)
+        if table.ndim != 2 or table.shape[1] != 2:
+            raise ValueError("must be a list of pairs [penetration m, force N]")
+        return ForceCurve(table[:, 0].copy(), table[:, 1].copy(), 2.0)
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"hood_curve: {error}") from None
+
+
+def _corridor_of(corridor: str | None, vehicle: str | None, zone: str) -> Corridor:
+    if corridor is None:
+        car = load_vehicle(vehicle or "family_car_1990s")
+        index = car.zone_index(zone)
+        if index < 0:
+            names = ", ".join(entry.name for entry in car.zones)
+            raise ValueError(f"vehicle {car.name!r} has no zone {zone!r}; it has {names}")
+        return car.zones[index].corridor
+    table = load_corridors(corridor)
+    if zone not in table:
+        raise ValueError(f"corridor {corridor!r} has no zone {zone!r}; it has {', '.join(table)}")
+    return table[zone]

@@ -72,6 +72,36 @@ def report(folder: Folder, quiet: Quiet = False, as_json: Json = False) -> None:
     _print_analysis(analysis, folder, quiet=quiet, as_json=as_json)
 
 
+@app.command("fit-stiffness")
+def fit_stiffness(
+    data: Annotated[
+        Path, typer.Argument(help="Folder of headform tests: measured data or ISO-MME.")
+    ],
+    out: Out = None,
+    zone: Annotated[str, typer.Option(help="Zone of the car that the corridor is for.")] = "hood",
+    method: Annotated[
+        str, typer.Option(help="How the corridor is built: quantiles or components.")
+    ] = "quantiles",
+    knots: Annotated[int, typer.Option(help="Most knots of a loading curve, 2 to 8.")] = 6,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Fit force-penetration curves to headform tests and build their stiffness corridor."""
+    from mcstudy.results import ResultsFolder
+    from studies import stiffness
+
+    folder = ResultsFolder(out or Path("results") / f"stiffness_{data.resolve().name}")
+    analysis = stiffness.fit_stiffness_of(
+        data, folder, zone=zone, method=method, knots=knots, quiet=quiet or as_json
+    )
+    if as_json:
+        _print_json({"folder": str(folder.path), "analysis": analysis})
+    elif not quiet:
+        console = Console()
+        _print_table(console, stiffness.summary_table(analysis))
+        console.print(f"report: {folder.path / 'report.html'}", soft_wrap=True)
+
+
 @app.command()
 def status(folder: Folder, as_json: Json = False) -> None:
     """Tell how far the study of a results folder is."""

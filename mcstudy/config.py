@@ -106,9 +106,7 @@ class Dependence(_Table):
 
 
 class Report(_Table):
-    """``[report]``: outputs to draw (by default those of the usual three that the model has),
-    references, number of histories kept.
-    """
+    """``[report]``: outputs to draw (see ``report_outputs``), references, histories kept."""
 
     outputs: Annotated[list[str], Field(min_length=1)] | None = None
     histories: NonNegativeInt = 8
@@ -208,7 +206,12 @@ def first_problem(error: ValidationError) -> str:
         parts = parts[1:]
     if len(parts) > 2 and parts[0] == "inputs" and parts[2] in DISTRIBUTION_NAMES:
         del parts[2]
+    mixed = len(parts) > 2 and parts[:2] == ["model", "options"]
+    if mixed:
+        parts = parts[:3]
     place = _one_line(".".join(parts) or "study")
+    if mixed:
+        return f"{place}: must be a text, a number or a list of pairs of numbers"
     kind = problem["type"]
     if kind == "extra_forbidden":
         return f"{place}: unknown key"

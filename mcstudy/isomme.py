@@ -98,7 +98,9 @@ def head_acceleration(test: Test) -> Channel:
         raise UserError(
             f"{test.name}: 'Velocity test object 1' and 'Mass test object 1' must be given"
         )
-    found = {c.code[14]: c for c in test.channels if c.code[2:6] == "HEAD" and c.code[12:14] == "AC"}
+    found = {
+        c.code[14]: c for c in test.channels if c.code[2:6] == "HEAD" and c.code[12:14] == "AC"
+    }
     if "R" in found:
         parts = [found["R"]]
     elif {"X", "Y", "Z"} <= set(found):
@@ -109,19 +111,15 @@ def head_acceleration(test: Test) -> Channel:
         )
     if any(p.time.shape != parts[0].time.shape or np.any(p.time != parts[0].time) for p in parts):
         raise UserError(f"{test.name}: the head acceleration's components differ in time")
-    squares = np.zeros(parts[0].time.size)
-    for part in parts:
-        try:
-            squares += (part.values * units.factor(part.unit, "g")) ** 2
-        except ValueError as error:
-            raise UserError(f"{test.name}: channel {part.code}: {error}") from None
+    try:
+        values = np.array([part.values * units.factor(part.unit, "g") for part in parts])
+    except ValueError as error:
+        raise UserError(f"{test.name}: {parts[0].code}: {error}") from None
+    kept = np.isfinite(values).all(axis=0)
     code = parts[0].code[:14] + "R" + parts[0].code[15:]
-    kept = np.isfinite(squares)
-    if len(parts) == 1:
-        # A resultant may have been stored with its sign: keep what lies before contact as noise.
-        signed = parts[0].values * units.factor(parts[0].unit, "g")
-        return Channel(code, "g", parts[0].time[kept], signed[kept])
-    return Channel(code, "g", parts[0].time[kept], np.sqrt(squares[kept]))
+    # A resultant channel stays as it is: its noise before contact may be of either sign.
+    found_values = values[0] if len(parts) == 1 else np.sqrt((values**2).sum(axis=0))
+    return Channel(code, "g", parts[0].time[kept], found_values[kept])
 
 
 def write_test(
@@ -245,4 +243,5 @@ def _channel(path: Path) -> Channel:
     if values.size < 2:
         raise UserError(f"{path}: holds no samples")
     unit = header.get("unit", "1")
-    return Channel(code, _UNITS.get(unit, unit), start + interval * np.arange(values.size), values)
+    time: Array = start + interval * np.arange(values.size, dtype=np.float64)
+    return Channel(code, _UNITS.get(unit, unit), time, values)

@@ -183,7 +183,7 @@ def _read_folder(folder: Path) -> Measured:
 
 def _series(path: Path, frame: pd.DataFrame, name: str) -> Array:
     """Return time and values of a column where both are given."""
-    table = frame[["time", name]].to_numpy(dtype=float)
+    table: Array = frame[["time", name]].to_numpy(dtype=float)
     table = table[np.isfinite(table).all(axis=1)]
     if len(table) < FEWEST_SAMPLES:
         raise UserError(f"{path}: column {name!r} has only {len(table)} samples")
@@ -213,9 +213,7 @@ def _from_isomme(folder: Path, tests: list[isomme.Test]) -> Measured:
     for test in tests:
         channel = isomme.head_acceleration(test)
         filters.add(channel.filter)
-        rows.append(
-            {"test": test.name, "impact_speed": test.velocity, "headform_mass": test.mass}
-        )
+        rows.append({"test": test.name, "impact_speed": test.velocity, "headform_mass": test.mass})
         signals[test.name] = {"head_acceleration": np.stack([channel.time, channel.values], 1)}
     if len(filters) > 1:
         raise UserError(f"{folder}: head accelerations are filtered differently: {sorted(filters)}")

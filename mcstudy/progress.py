@@ -3,8 +3,32 @@
 import sys
 import time
 from collections import Counter
-from collections.abc import Mapping
-from typing import TextIO
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TextIO, TypeVar
+
+Item = TypeVar("Item")
+
+
+def follow(
+    items: Sequence[Item], what: str, *, quiet: bool = False, stream: TextIO = sys.stderr
+) -> Iterator[Item]:
+    """Yield the items and show on a terminal how many are done.
+
+    Parameters
+    ----------
+    items : sequence. what : word for the line, e.g. ``tests``.
+    quiet : print nothing at all. stream : where to.
+    """
+    live = not quiet and stream.isatty()
+    for done, item in enumerate(items):
+        if live:
+            name = f" ({item})" if isinstance(item, str) else ""
+            stream.write(f"\r\x1b[K{done}/{len(items)} {what}{name}")
+            stream.flush()
+        yield item
+    if live:
+        stream.write(f"\r\x1b[K{len(items)}/{len(items)} {what}\n")
+        stream.flush()
 
 
 class Progress:

@@ -3,19 +3,28 @@
 A corridor coordinate from 0 (lower) over 0.5 (median) to 1 (upper) picks a curve between them.
 """
 
+import json
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from models import data
 from models.contact.law import ForceCurve
+from models.contact.loading import MOST_KNOTS, choose_knots, fit_loading
 
 Array = NDArray[np.float64]
+
+
+LEVEL = 0.9
+"""Share of curves between the bounds of a corridor built from tests."""
+FEWEST_CURVES = 3
+METHODS = ("quantiles", "components")
 
 
 @dataclass(frozen=True)
@@ -107,12 +116,6 @@ def load_corridors(name: str) -> dict[str, Corridor]:
         raise ValueError(f"corridor {name!r}: {error}") from None
 
 
-LEVEL = 0.9
-"""Share of curves between the bounds of a corridor built from tests."""
-FEWEST_CURVES = 3
-METHODS = ("quantiles", "components")
-
-
 def build_corridor(curves: Sequence[ForceCurve], method: str = "quantiles") -> Corridor:
     """Return the corridor of a set of measured curves.
 
@@ -154,7 +157,7 @@ def build_corridor(curves: Sequence[ForceCurve], method: str = "quantiles") -> C
         bounds = np.maximum.accumulate(np.exp(mean + np.array([[-1.0], [0.0], [1.0]]) * reach), 1)
     depth = np.concatenate([[0.0], grid])
     forces = np.pad(bounds, ((0, 0), (1, 0)))
-    knots = choose_knots(depth, forces[1], KNOTS // 2)
+    knots = choose_knots(depth, forces[1], MOST_KNOTS)
     ratio = float(np.median([curve.unloading_ratio for curve in curves]))
     return Corridor(*(ForceCurve(knots, fit_loading(depth, f, knots), ratio) for f in forces))
 

@@ -2,8 +2,8 @@
 
 The front is a row of *zones* in its own frame (x forward, z up, origin on the road under the
 foremost point): rolls (cylinders across the car: lower bumper, bumper, hood edge) and panels
-(planes: grille, hood, fender sides, windscreen, roof). Seen from above every zone follows a parabola of the
-given curvature.
+(planes: grille, hood, fender sides, windscreen, roof). Seen from above every zone follows a
+parabola of the given curvature.
 """
 
 from typing import NamedTuple

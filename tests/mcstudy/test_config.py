@@ -225,8 +225,8 @@ BAD: dict[str, tuple[list[tuple[str, str]], list[str]]] = {
                            ["fixed", "dictionary"]),
     "input_is_a_number": ([(f"[inputs.impact_speed]\n{SPEED}", "[inputs]\nimpact_speed = 3")],
                           ["inputs.impact_speed"]),
-    "option_is_a_number": ([('vehicle = "car"', "vehicle = 3")],
-                           ["model.options.vehicle", "string"]),
+    "option_is_a_switch": ([('vehicle = "car"', "vehicle = true")],
+                           ["model.options.vehicle", "text, a number or a list"]),
     "no_outputs": ([('outputs = ["hic15", "wad"]', "outputs = []")], ["report.outputs"]),
     "pair_too_short": ([(PAIR, '["impact_speed", "stature"]')], ["dependence.correlations.0"]),
     # not TOML

@@ -137,9 +137,9 @@ def calibrate(draws: int, workers: int, seed: int) -> tuple[Array, float]:
 def main() -> None:
     """Calibrate and print values, targets and predictions."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--draws", type=int, default=2000)
+    parser.add_argument("--draws", type=int, default=6000)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=2)
     options = parser.parse_args()
     x, score = calibrate(options.draws, options.workers, options.seed)
     inputs = inputs_of(x)

@@ -1,0 +1,1 @@
+"""Tests of single body parts, as dummies, volunteers and donors undergo them."""

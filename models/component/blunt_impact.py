@@ -1,0 +1,119 @@
+"""A flat rigid impactor against one region of the free, upright body, from the front.
+
+Thorax and abdomen impacts of child donors (Ouyang 2006, 2015) and of dummies (49 CFR 572.124).
+Weight is left out: the impact is over before the body has begun to fall.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.compilation import kernel
+from models.contact.law import KNOTS, contact_force, law_of
+from models.multibody.integration import correct, predict
+from models.multibody.joints import apply_joint_torques
+from models.multibody.setup import build_ellipsoids, build_tree, place
+from models.multibody.surfaces import empty_contacts, push, update_surfaces
+from models.multibody.tree import empty_loads, solve_accelerations, update_kinematics
+from models.pedestrian.anthropometry import SEGMENTS, Body
+from models.pedestrian.joints import Joints
+from models.pedestrian.posture import standing_posture
+from models.pedestrian.tissue import build_tissue
+
+Array = NDArray[np.float64]
+
+STEP = 2e-5
+"""s."""
+DURATION = 0.12
+"""s of impact at most."""
+
+
+@dataclass(frozen=True)
+class BluntImpact:
+    """Histories of an impact.
+
+    Attributes
+    ----------
+    time : (n,) s. force : (n,) N. deflection : (n,) m, penetration of the face into the region.
+    """
+
+    time: Array
+    force: Array
+    deflection: Array
+
+    @property
+    def hysteresis(self) -> float:
+        """Share of the work of loading that unloading does not give back."""
+        power = np.diff(self.deflection) * 0.5 * (self.force[1:] + self.force[:-1])
+        loading = float(power[power > 0.0].sum())
+        return float(power.sum()) / loading if loading > 0.0 else math.nan
+
+
+@kernel
+def _strike(
+    tree, joints, ellipsoids, motion, loads, contacts, spin, velocity, alpha, acceleration, power,
+    laws, count, segment, mass, speed, step, out,
+):  # fmt: skip
+    """Step until the record ``out`` (n, 2) of force and deflection is full."""
+    face, rate, force, deepest = 0.0, speed, 0.0, 0.0
+    for k in range(out.shape[0]):
+        old_force = force
+        if k > 0:
+            face -= step * rate - 0.5 * step * step * old_force / mass
+            predict(motion, loads, spin, velocity, alpha, acceleration, step)
+        update_kinematics(tree, motion)
+        update_surfaces(ellipsoids, motion, contacts)
+        for i in range(tree.mass.shape[0]):
+            for j in range(3):
+                loads.force[i, j] = 0.0
+                loads.torque[i, j] = 0.0
+        reach = math.sqrt(contacts.shape[segment, 0])
+        front = contacts.centre[segment, 0] + reach
+        if k == 0:
+            face = front
+        depth = front - face
+        deepest = max(deepest, depth)
+        elastic, viscous = contact_force(laws, 0, count, 0.0, 0.0, max(depth, 0.0), 0.0, deepest)
+        force = elastic + viscous
+        push(
+            motion, loads, segment, front,
+            contacts.centre[segment, 1] + contacts.shape[segment, 1] / reach,
+            contacts.centre[segment, 2] + contacts.shape[segment, 2] / reach,
+            -force, 0.0, 0.0,
+        )  # fmt: skip
+        apply_joint_torques(tree, joints, motion, loads, power)
+        solve_accelerations(tree, motion, loads)
+        if k > 0:
+            correct(motion, loads, spin, velocity, alpha, acceleration, step)
+            rate -= 0.5 * step * (old_force + force) / mass
+        out[k, 0] = force
+        out[k, 1] = max(depth, 0.0)
+
+
+def strike_region(
+    body: Body, joints: Joints, region: str, impactor_mass: float, speed: float
+) -> BluntImpact:
+    """Strike a region of the upright body from the front.
+
+    Parameters
+    ----------
+    body, joints : Body, Joints
+    region : a segment of the trunk or the head, e.g. ``chest``.
+    impactor_mass, speed : kg, m/s.
+    """
+    n, segment = len(SEGMENTS), SEGMENTS.index(region)
+    laws = np.zeros((1, KNOTS, 4))
+    count = law_of(build_tissue(body)[region], laws[0])
+    ellipsoids = build_ellipsoids(body, [])
+    out = np.zeros((round(DURATION / STEP), 2))
+    _strike(
+        build_tree(body), joints, ellipsoids, place(standing_posture(body)), empty_loads(n),
+        empty_contacts(n, 0, len(ellipsoids.pairs)), np.zeros((n, 3)), np.zeros(3),
+        np.zeros((n, 3)), np.zeros(3), np.zeros(2), laws, count, segment, impactor_mass, speed,
+        STEP, out,
+    )  # fmt: skip
+    over = np.flatnonzero((out[:, 0] == 0.0) & (np.arange(len(out)) > np.argmax(out[:, 0])))
+    end = int(over[0]) + 1 if over.size else len(out)
+    return BluntImpact(np.arange(end) * STEP, out[:end, 0].copy(), out[:end, 1].copy())

@@ -1,0 +1,143 @@
+"""Head and neck on a falling pendulum that is stopped: 49 CFR 572.123, 6-year-old dummy.
+
+The pendulum is the root of the tree, so heavy that head and neck do not move it; head and neck
+hang from it upside down with the joints and inertia of the model's own body.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.compilation import kernel
+from models.criteria.units import STANDARD_GRAVITY
+from models.multibody.integration import correct, predict
+from models.multibody.joints import apply_joint_torques
+from models.multibody.tree import (
+    Tree,
+    empty_loads,
+    empty_motion,
+    solve_accelerations,
+    update_kinematics,
+)
+from models.pedestrian.anthropometry import SEGMENTS, Body
+from models.pedestrian.joints import Joints
+
+Array = NDArray[np.float64]
+
+ARM, GAUGE = 1.80, 1.657
+"""m from the pivot to the base of the neck and to the point whose speed is prescribed (recalled:
+49 CFR 572.33, figure 22)."""
+HEAVY = 1e8
+"""Mass (kg) and inertia (kg m2) of the pendulum: beyond what head and neck can move."""
+STEP = 2e-5
+"""s; the lightest segment's damping rate times it stays below one half."""
+DURATION = 0.25
+"""s after the pendulum meets its stop."""
+
+_FACING = {"flexion": (0.0, 1.0, 0.0, 0.0), "extension": (0.0, 0.0, 1.0, 0.0)}
+
+
+@dataclass(frozen=True)
+class PendulumTest:
+    """Histories of a neck pendulum test.
+
+    Attributes
+    ----------
+    time : (n,) s after the stop is met.
+    angle : (n,) rad, rotation of the head against the pendulum, in the direction of the test.
+    moment : (n,) N m about the occipital condyles, positive when it resists that rotation.
+    """
+
+    time: Array
+    angle: Array
+    moment: Array
+
+    def decay_time(self, level: float) -> float:
+        """Return when (s) the moment first falls to ``level`` (N m) after its peak, or NaN."""
+        peak = int(np.argmax(self.moment))
+        below = np.flatnonzero(self.moment[peak:] <= level)
+        return float(self.time[peak + below[0]]) if below.size else np.nan
+
+
+@kernel
+def _swing(
+    tree, joints, motion, loads, spin, velocity, alpha, acceleration, power, rates, step, out
+):  # fmt: skip
+    """Step the pendulum through its angular accelerations ``rates`` (n,) about y, rad/s2.
+
+    ``out`` (n, 3) gets the head's quaternion parts w and y and the torque of its joint about y.
+    """
+    head = tree.mass.shape[0] - 1
+    for k in range(rates.shape[0]):
+        if k > 0:
+            predict(motion, loads, spin, velocity, alpha, acceleration, step)
+        update_kinematics(tree, motion)
+        for i in range(tree.mass.shape[0]):
+            for j in range(3):
+                loads.force[i, j] = 0.0
+                loads.torque[i, j] = 0.0
+            if i > 0:
+                loads.force[i, 2] = -tree.mass[i] * STANDARD_GRAVITY
+        loads.torque[0, 1] = rates[k] * tree.inertia[0, 1]
+        apply_joint_torques(tree, joints, motion, loads, power)
+        solve_accelerations(tree, motion, loads)
+        if k > 0:
+            correct(motion, loads, spin, velocity, alpha, acceleration, step)
+        # The head against the pendulum: conj(root) * head, whose x and z parts stay 0.
+        w, x, y, z = motion.orientation[0]
+        hw, hx, hy, hz = motion.orientation[head]
+        out[k, 0] = w * hw + x * hx + y * hy + z * hz
+        out[k, 1] = w * hy - y * hw - z * hx + x * hz
+        out[k, 2] = loads.joint_torque[head, 1]
+
+
+def swing_neck(
+    body: Body, joints: Joints, direction: str, speed: float, pulse: Array
+) -> PendulumTest:
+    """Run the neck pendulum test.
+
+    Parameters
+    ----------
+    body, joints : whose head and neck hang on the pendulum.
+    direction : {"flexion", "extension"}
+    speed : m/s of the gauge when the stop is met.
+    pulse : (k, 2) s and m/s, what the gauge has lost by then; the last row reaches ``speed``.
+
+    Raises
+    ------
+    ValueError
+        If the direction is unknown or the pulse does not end with the pendulum at rest.
+    """
+    if direction not in _FACING:
+        raise ValueError(f"direction must be one of {', '.join(_FACING)}, given {direction!r}")
+    pulse = np.asarray(pulse, dtype=np.float64)
+    if not np.isclose(pulse[-1, 1], speed):
+        raise ValueError(f"the pulse ends at {pulse[-1, 1]:g} m/s, not at the speed {speed:g} m/s")
+    rows = [SEGMENTS.index("neck"), SEGMENTS.index("head")]
+    chain = [0, *rows]
+    tree = Tree(
+        parent=np.array([-1, 0, 1], dtype=np.int64),
+        joint_in_parent=np.array(
+            [[0.0] * 3, [0.0, 0.0, ARM], body.joint[rows[1]] - body.joint[rows[0]]]
+        ),
+        centre_from_joint=np.vstack([np.zeros(3), body.centre[rows] - body.joint[rows]]),
+        mass=np.array([HEAVY, *body.mass[rows]]),
+        inertia=np.vstack([np.full(3, HEAVY), body.inertia[rows]]),
+    )
+    held = Joints(*(np.ascontiguousarray(array[chain]) for array in joints))
+    n = len(chain)
+    motion, loads = empty_motion(n), empty_loads(n)
+    motion.orientation[:] = _FACING[direction]
+    motion.angular_velocity[:, 1] = -speed / GAUGE
+    time = np.arange(round(DURATION / STEP) + 1) * STEP
+    lost = np.interp(time, pulse[:, 0], pulse[:, 1])
+    rates = np.diff(lost, append=lost[-1]) / (STEP * GAUGE)
+    out = np.zeros((time.size, 3))
+    _swing(
+        tree, held, motion, loads, np.zeros((n, 3)), np.zeros(3), np.zeros((n, 3)), np.zeros(3),
+        np.zeros(2), rates, STEP, out,
+    )  # fmt: skip
+    # The pendulum's own y axis points to the right when the body faces the way of the swing.
+    sign = 1.0 if direction == "flexion" else -1.0
+    return PendulumTest(time, sign * 2.0 * np.arctan2(out[:, 1], out[:, 0]), out[:, 2].copy())

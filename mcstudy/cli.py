@@ -10,6 +10,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from rich.console import Console
 from rich.table import Table as RichTable
+from rich.text import Text
 
 from mcstudy.errors import StudyError, UserError
 
@@ -103,6 +104,36 @@ def fit_stiffness(
 
 
 @app.command()
+def validate(
+    out: Out = None,
+    measured: Annotated[
+        Path, typer.Option(help="Folder of real measurements; left out where it is missing.")
+    ] = Path("../shared/measured"),
+    only: Annotated[list[str] | None, typer.Option(help="One part; may be repeated.")] = None,
+    workers: Workers = -1,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Run the models against closed forms, published numbers and measurements."""
+    from mcstudy.results import ResultsFolder
+    from studies.validation import report
+
+    folder = ResultsFolder(out or Path("results/validation"))
+    analysis = report.validate(
+        folder, measured=measured, only=only or (), workers=workers, quiet=quiet or as_json
+    )
+    if as_json:
+        _print_json({"folder": str(folder.path), "analysis": analysis})
+    elif not quiet:
+        console = Console()
+        _print_table(console, report.table_of(analysis))
+        counts = ", ".join(f"{n} {word}" for word, n in analysis["counts"].items())
+        console.print(f"{len(analysis['checks'])} checks: {counts}")
+        console.print(f"report: {folder.path / 'report.html'}", soft_wrap=True)
+    report.check_exact(analysis)
+
+
+@app.command()
 def status(folder: Folder, as_json: Json = False) -> None:
     """Tell how far the study of a results folder is."""
     from mcstudy.results import ResultsFolder
@@ -179,7 +210,8 @@ def _print_analysis(analysis: dict[str, Any], path: Path, *, quiet: bool, as_jso
 def _print_table(console: Console, table: Any) -> None:
     shown = RichTable(*table.head, title=table.caption)
     for row in table.rows:
-        shown.add_row(*row)
+        # Text, not markup: a label in square brackets is no style.
+        shown.add_row(*(Text(cell) for cell in row))
     console.print(shown)
 
 

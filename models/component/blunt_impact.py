@@ -116,4 +116,5 @@ def strike_region(
     )  # fmt: skip
     over = np.flatnonzero((out[:, 0] == 0.0) & (np.arange(len(out)) > np.argmax(out[:, 0])))
     end = int(over[0]) + 1 if over.size else len(out)
-    return BluntImpact(np.arange(end) * STEP, out[:end, 0].copy(), out[:end, 1].copy())
+    time: Array = np.arange(end, dtype=np.float64) * STEP
+    return BluntImpact(time, out[:end, 0].copy(), out[:end, 1].copy())

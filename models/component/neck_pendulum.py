@@ -130,7 +130,7 @@ def swing_neck(
     motion, loads = empty_motion(n), empty_loads(n)
     motion.orientation[:] = _FACING[direction]
     motion.angular_velocity[:, 1] = -speed / GAUGE
-    time = np.arange(round(DURATION / STEP) + 1) * STEP
+    time: Array = np.arange(round(DURATION / STEP) + 1, dtype=np.float64) * STEP
     lost = np.interp(time, pulse[:, 0], pulse[:, 1])
     rates = np.diff(lost, append=lost[-1]) / (STEP * GAUGE)
     out = np.zeros((time.size, 3))

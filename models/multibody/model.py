@@ -24,7 +24,7 @@ from models.multibody.simulation import (
 )
 from models.multibody.surfaces import CHANNELS, empty_contacts
 from models.multibody.tree import empty_loads
-from models.pedestrian.anthropometry import HEAD, LARGEST_HEAD_SHARE, SEGMENTS, TRUNK
+from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK, is_possible
 from models.protocol import OK, Batch, Input, Output, Run, complete_inputs
 from models.vehicle.profile import Vehicle, load_vehicle
 
@@ -157,7 +157,7 @@ class MultibodyModel:
 
     def _simulate(self, values: dict[str, float]) -> outcome.Raw | str:
         """Return what the step loop leaves behind, or the status that keeps it from starting."""
-        if values["head_mass"] >= LARGEST_HEAD_SHARE * values["body_mass"]:
+        if not is_possible(values["stature"], values["body_mass"], values["head_mass"]):
             return IMPOSSIBLE_BODY
         crash = build_crash(values, self.vehicle)
         return NO_CONTACT if crash is None else self._step(crash, values)

@@ -38,6 +38,8 @@ PARENTS = (-1, 0, 1, 2, 3, 2, 5, 2, 7, 0, 9, 10, 0, 12, 13)
 HEAD = SEGMENTS.index("head")
 LARGEST_HEAD_SHARE = 0.5
 """Share of the body's mass beyond which a head is refused (assumed; a newborn's is about 0.3)."""
+BODY_MASS_INDEX = (8.0, 80.0)
+"""kg/m2 beyond which no body is (assumed; starved adults reach about 10, the heaviest about 75)."""
 HEAD_INERTIA_FACTOR = 1.15
 """A skull carries its mass further out than a homogeneous ellipsoid: the data sheet allows 15 %
 more for the head [estimated]."""
@@ -47,6 +49,12 @@ TRUNK = tuple(SEGMENTS.index(name) for name in ("hip", "abdomen", "chest"))
 def region_of(segment: str) -> str:
     """Return the body region of a segment: its name without the side."""
     return segment.removesuffix("_left").removesuffix("_right")
+
+
+def is_possible(stature: float, body_mass: float, head_mass: float) -> bool:
+    """Return whether a body of this stature (m), mass and head mass (kg) can exist."""
+    low, high = BODY_MASS_INDEX
+    return head_mass < LARGEST_HEAD_SHARE * body_mass and low <= body_mass / stature**2 <= high
 
 
 @dataclass(frozen=True)

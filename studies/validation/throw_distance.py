@@ -1,0 +1,194 @@
+"""Throw distance over speed against formulas of the accident literature."""
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mcstudy.figures import style
+from mcstudy.figures.panels import Band, Curve, Panel, draw_panels
+from mcstudy.text import number
+from models.criteria.units import STANDARD_GRAVITY
+from studies.validation.check import Part, check
+from studies.validation.sweep import sweep
+from studies.validation.walkers import ADULT, CENTRAL, CHILD, SIDES
+
+Array = NDArray[np.float64]
+
+SPEEDS = np.arange(20.0, 71.0, 10.0)
+"""km/h."""
+FRICTIONS = (0.5, 0.6, 0.7)
+PHASES = (0.0, 0.17, 0.33, 0.5, 0.67, 0.83)
+
+
+def searle(distance: Array, friction: Array | float) -> tuple[Array, Array]:
+    """Return Searle's lowest and highest speed (m/s) for a throw distance (m)."""
+    highest = np.sqrt(2.0 * friction * STANDARD_GRAVITY * distance)
+    return highest / np.sqrt(1.0 + np.square(friction)), highest
+
+
+def toor_wrap(distance: Array) -> Array:
+    """Return the speed (km/h) of Toor and Araszewski 2003 for wrap (recalled)."""
+    return 9.84 * np.asarray(distance) ** 0.57
+
+
+def toor_forward(distance: Array) -> Array:
+    """Return the speed (km/h) of Toor and Araszewski 2003 for forward projection (recalled)."""
+    return 8.25 * np.asarray(distance) ** 0.61
+
+
+def happer_wrap(distance: Array) -> Array:
+    """Return the speed (km/h) of Happer 2000 for wrap (recalled)."""
+    return 13.3 * np.sqrt(distance) - 4.6
+
+
+def wood_simms(distance: Array, factor: float = 3.6) -> Array:
+    """Return the speed (m/s) of Wood, Simms and Walsh 2004; bounds 2.5 and 4.5 (recalled)."""
+    return factor * np.sqrt(distance)
+
+
+def validate(workers: int) -> Part:
+    """Return the part on throw distance."""
+    tables = {
+        name: sweep(
+            [
+                {**CENTRAL, **person, "impact_speed": speed / 3.6, "facing_angle": side,
+                 "gait_phase": phase, "friction_body_road": friction}
+                for speed in SPEEDS
+                for friction in FRICTIONS
+                for phase in PHASES
+                for side in SIDES
+            ],
+            workers=workers,
+        )
+        for name, person in (("child", CHILD), ("adult", ADULT))
+    }  # fmt: skip
+    child, adult = tables["child"], tables["adult"]
+    checks = [
+        check("throw_child_40", _at_forty(child[child["friction_body_road"] == 0.6])),
+        check("throw_child_searle", 100.0 * _within_searle(child)),
+        check("throw_adult_searle", 100.0 * _within_searle(adult)),
+        check("throw_child_wood", 100.0 * _within_wood(child)),
+        check("throw_adult_wood", 100.0 * _within_wood(adult)),
+        check("throw_adult_toor", _worst(_medians(adult), toor_wrap)),
+        check("throw_adult_happer", _worst(_medians(adult), happer_wrap)),
+        check("throw_child_forward", _worst(_medians(child), toor_forward)),
+        check("throw_efficiency", float(_at(child, 40.0)["launch_speed"].median() * 3.6 / 40.0)),
+    ]
+    caption = (
+        "Throw distance over impact speed: every run (points), their median, and published "
+        "relations. Friction 0.5 to 0.7, six phases of the gait, both sides."
+    )
+    figure = draw_panels([_panel(name, table) for name, table in tables.items()], height=4.2)
+    words = [_words(name, table) for name, table in tables.items()]
+    return Part("Throw distance", words, checks, {caption: figure})
+
+
+def _at(table: pd.DataFrame, speed: float) -> pd.DataFrame:
+    return table[np.isclose(3.6 * table["impact_speed"], speed)]
+
+
+def _medians(table: pd.DataFrame) -> Array:
+    """Return the median throw (m) at each of ``SPEEDS``."""
+    return np.array([_at(table, v)["throw_distance"].median() for v in SPEEDS])
+
+
+def _at_forty(table: pd.DataFrame) -> float:
+    """Return the median throw (m) at 40 km/h."""
+    return float(_at(table, 40.0)["throw_distance"].median())
+
+
+def _within_searle(table: pd.DataFrame) -> float:
+    throw = table["throw_distance"].to_numpy()
+    low, high = searle(throw, table["friction_body_road"].to_numpy())
+    speed = table["impact_speed"].to_numpy()
+    return float(np.mean((low <= speed) & (speed <= high)))
+
+
+def _within_wood(table: pd.DataFrame) -> float:
+    throw, speed = table["throw_distance"].to_numpy(), table["impact_speed"].to_numpy()
+    return float(np.mean((wood_simms(throw, 2.5) <= speed) & (speed <= wood_simms(throw, 4.5))))
+
+
+def _worst(medians: Array, relation: object) -> float:
+    """Return the largest error (km/h) of a relation's speed for our medians, 30 to 60 km/h."""
+    middle = (SPEEDS >= 30.0) & (SPEEDS <= 60.0)
+    assert callable(relation)
+    errors = (relation(medians) - SPEEDS)[middle]
+    return float(errors[np.argmax(np.abs(errors))])
+
+
+def _words(name: str, table: pd.DataFrame) -> str:
+    """Say where the runs lie against the published relations."""
+    throw = table["throw_distance"].to_numpy()
+    low, high = searle(throw, table["friction_body_road"].to_numpy())
+    speed = table["impact_speed"].to_numpy()
+    short = [f"{v:.0f}" for v in SPEEDS if np.mean((high < speed)[_rows(table, v)]) > 0.5]
+    far = [f"{v:.0f}" for v in SPEEDS if np.mean((low > speed)[_rows(table, v)]) > 0.5]
+    errors = toor_wrap(_medians(table)) - SPEEDS
+    lines = [
+        f"The {name}: {100.0 * np.mean((low <= speed) & (speed <= high)):.0f} % of the runs lie "
+        f"within Searle's bounds for their own friction, {100.0 * np.mean(speed > high):.0f} % "
+        f"fall short of them and {100.0 * np.mean(speed < low):.0f} % go beyond."
+    ]
+    friction = table["friction_body_road"].to_numpy()
+    farthest = speed**2 * (1.0 + friction**2) / (2.0 * friction * STANDARD_GRAVITY)
+    launched = table["launch_speed"].to_numpy()
+    if short:
+        lines.append(
+            f"At {', '.join(short)} km/h most runs fall short. Searle's bounds start the body at "
+            "the car's speed; here the centre of gravity reaches "
+            f"{_efficiency(table):.2f} of it (median), as the body turns over a hood that brakes. "
+            f"With that speed in place of the car's, {_share(low <= launched)} of the runs reach "
+            f"the least throw or more for it, and {_share(launched > high)} still fall short."
+        )
+    if far:
+        lines.append(
+            f"At {', '.join(far)} km/h most runs go beyond the bounds, by "
+            f"{number(float(np.median((throw - farthest)[speed < low])), 2)} m (median): the throw "
+            "counts from first contact, and the body travels on the car before it leaves it."
+        )
+    if not short and not far:
+        lines.append("At no speed do most runs lie outside.")
+    side = "lower" if errors.mean() < 0.0 else "higher"
+    lines.append(
+        "From our median throws Toor's and Araszewski's wrap regression would give speeds that "
+        f"are {number(abs(float(errors.mean())), 2)} km/h {side} than the true ones on average "
+        f"({number(float(errors.min()), 2)} to {number(float(errors.max()), 2)} km/h); our throw "
+        f"at 40 km/h, all frictions, is {number(_at_forty(table))} m."
+    )
+    return " ".join(lines)
+
+
+def _rows(table: pd.DataFrame, speed: float) -> NDArray[np.bool_]:
+    return np.isclose(3.6 * table["impact_speed"].to_numpy(), speed)
+
+
+def _share(rows: NDArray[np.bool_]) -> str:
+    return f"{100.0 * np.mean(rows):.0f} %"
+
+
+def _efficiency(table: pd.DataFrame) -> float:
+    return float((table["launch_speed"] / table["impact_speed"]).median())
+
+
+def _panel(name: str, table: pd.DataFrame) -> Panel:
+    s = np.linspace(1.0, 60.0, 200)
+    rng = np.random.default_rng(0)
+    shown = 3.6 * table["impact_speed"].to_numpy() + rng.uniform(-0.8, 0.8, len(table))
+    curves = [
+        Curve(shown, table["throw_distance"].to_numpy(), "runs", style.SKY, "", "."),
+        Curve(SPEEDS, _medians(table), "median of the runs", style.BLUE, "-", "o"),
+        Curve(toor_wrap(s), s, "Toor, Araszewski: wrap", style.ORANGE),
+        Curve(toor_forward(s), s, "Toor, Araszewski: forward", style.ORANGE, "--"),
+        Curve(happer_wrap(s), s, "Happer: wrap", style.PURPLE),
+        Curve(3.6 * wood_simms(s), s, "Wood, Simms", "black", "-"),
+        Curve(3.6 * wood_simms(s, 2.5), s, None, "black", ":"),
+        Curve(3.6 * wood_simms(s, 4.5), s, "Wood, Simms, limits", "black", ":"),
+    ]
+    grid = np.linspace(15.0, 75.0, 100) / 3.6
+    reach = grid**2 / (2.0 * 0.6 * STANDARD_GRAVITY)
+    band = Band(3.6 * grid, reach, reach * (1.0 + 0.6**2), "Searle, friction 0.6", style.GREEN)
+    return Panel(
+        "impact speed [km/h]", "throw distance [m]", curves, [band], name,
+        (15.0, 75.0), (0.0, 55.0), "upper left",
+    )  # fmt: skip

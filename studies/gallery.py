@@ -1,9 +1,12 @@
-"""Remake the README's pictures from the nominal case and the full study."""
+"""Remake the README's pictures from the nominal case, the full study and the validation."""
 
 import shutil
 from pathlib import Path
 
+from mcstudy.results import ResultsFolder
 from studies.api import run_case, run_study
+from studies.stiffness import fit_stiffness_of
+from studies.validation.report import validate
 
 GALLERY = Path("results/gallery")
 
@@ -12,13 +15,19 @@ def main() -> None:
     """Run the case and the study and copy the chosen pictures to ``results/gallery``."""
     _, _, case = run_case("configs/paper_case.toml")
     study = run_study("configs/paper_study.toml", quiet=False)
+    hood = ResultsFolder("results/stiffness_hood_tests")
+    fit_stiffness_of(Path("configs/hood_tests"), hood)
+    validation = ResultsFolder("results/validation_throw")
+    validate(validation, measured=Path("../shared/measured"), only=("throw",))
     GALLERY.mkdir(parents=True, exist_ok=True)
     for folder, names in (
         (case, ("kinematics.png", "head_acceleration.png", "crash.gif")),
         (study, ("distributions.png", "throw_and_wad.png", "rank_correlation.png")),
+        (hood, ("force_penetration.png", "corridor.png")),
     ):
         for name in names:
             shutil.copyfile(folder.path / "figures" / name, GALLERY / name)
+    shutil.copyfile(validation.path / "figures" / "throw_1.png", GALLERY / "validation_throw.png")
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from mcstudy.report import Section, Table, render
 from mcstudy.results import ResultsFolder
 from mcstudy.text import number, quantity, unit
 from models.protocol import Model, Run, complete_status
+from studies.exchange import write_isomme
 from studies.monte_carlo import load_study_model
 
 PRIMARY = 0.12
@@ -161,6 +162,10 @@ def write_reconstruction(
             | _work(run),
         )
         folder.add_histories(0, run.histories)
+        write_isomme(
+            run, model.name, folder.path / "iso_mme" / study.name, name=study.name,
+            title=study.title,
+        )  # fmt: skip
         figures = draw(study, run)
         style.save(figures, folder.path / "figures")
         animations = {}

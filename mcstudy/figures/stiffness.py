@@ -151,7 +151,8 @@ def draw_corridor(
                           linewidth=1.0, label=word)  # fmt: skip
         right.set(xlabel="corridor coordinate, 0 lower to 1 upper [–]", ylabel="HIC15 [–]",
                   xlim=(0.0, 1.0), ylim=(0.0, None), title="HIC corridor")  # fmt: skip
-        right.legend(framealpha=0.9)
+        right.set_ylim(top=1.4 * right.get_ylim()[1])
+        right.legend(framealpha=0.9, loc="upper left", ncols=2, fontsize=8)
         return figure
 
 

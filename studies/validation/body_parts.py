@@ -115,12 +115,16 @@ def _neck_panels(direction: str, tests: dict[float, PendulumTest]) -> list[Panel
         panels.append(
             Panel(
                 "time [ms]", f"{label} [{unit}]",
-                [Curve(1e3 * t.time, values, f"stiffness {f:g}", colours[f])
+                [Curve(1e3 * t.time, values, _name(f), colours[f])
                  for (f, t), values in zip(tests.items(), histories, strict=True)],
                 bands, f"{direction}: {label}", (0.0, 200.0),
             )
         )  # fmt: skip
     return panels
+
+
+def _name(factor: float) -> str:
+    return f"stiffness {factor:g}" + ("" if factor in FACTORS else ", nominal")
 
 
 def _draw_impacts(thorax: BluntImpact, dummy: BluntImpact, abdomen: BluntImpact) -> Figure:

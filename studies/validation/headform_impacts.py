@@ -47,10 +47,12 @@ def validate(workers: int) -> Part:
             "impact speed [km/h]",
             "HIC15 [–]",
             [
-                Curve(3.6 * SPEEDS, _over_speed(corridor, at), f"{at} of {name}", PALETTE[2 * k],
+                Curve(3.6 * SPEEDS, _over_speed(corridor, at), f"{word} of {name}", PALETTE[2 * k],
                       line)
                 for k, (name, corridor) in enumerate(hoods.items())
-                for at, line in ((0.0, ":"), (0.5, "-"), (1.0, "--"))
+                for at, word, line in (
+                    (0.0, "lower", ":"), (0.5, "median", "-"), (1.0, "upper", "--")
+                )
             ],
             ylim=(0.0, 4000.0),
             title="child headform 2.5 kg, perpendicular",

@@ -138,8 +138,10 @@ def _words(name: str, table: pd.DataFrame) -> str:
             f"At {', '.join(short)} km/h most runs fall short. Searle's bounds start the body at "
             "the car's speed; here the centre of gravity reaches "
             f"{_efficiency(table):.2f} of it (median), as the body turns over a hood that brakes. "
-            f"With that speed in place of the car's, {_share(low <= launched)} of the runs reach "
-            f"the least throw or more for it, and {_share(launched > high)} still fall short."
+            "With the speed that it reaches in place of the car's, "
+            f"{_share(launched > high)} of all runs fall short, "
+            f"{_share((low <= launched) & (launched <= high))} lie within the bounds and "
+            f"{_share(launched < low)} go beyond them: the throw also counts the way on the car."
         )
     if far:
         lines.append(

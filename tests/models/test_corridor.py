@@ -18,7 +18,7 @@ from models.registry import load_model
 
 Array = NDArray[np.float64]
 
-QUIET = settings(derandomize=True, deadline=None, database=None, max_examples=120)
+QUIET = settings(derandomize=True, deadline=None, database=None, max_examples=60)
 ZONES = ("hood", "hood_edge", "bumper", "fender_side", "windscreen")
 SHIPPED = data.names("corridors")
 
@@ -59,6 +59,9 @@ def test_forces_between_are_interpolated_linearly() -> None:
     for coordinate, expected in (
         (0.1, 0.8 * lower + 0.2 * median),
         (0.25, 0.5 * lower + 0.5 * median),
+        (0.49, 0.02 * lower + 0.98 * median),
+        (0.51, 0.98 * median + 0.02 * upper),
+        (0.6, 0.8 * median + 0.2 * upper),
         (0.75, 0.5 * median + 0.5 * upper),
         (0.9, 0.2 * median + 0.8 * upper),
     ):
@@ -169,12 +172,12 @@ def test_components_of_curves_that_differ_by_a_factor(sigma: float) -> None:
 
 
 def test_components_and_quantiles_agree_for_many_curves() -> None:
-    # 400 factors: the standard error of a 5 % quantile of the logarithm is 0.1 sigma.
-    curves, _ = scaled_curves(400, 0.3, seed=1)
+    # 200 factors: the standard error of a 5 % quantile of the logarithm is 0.15 sigma.
+    curves, _ = scaled_curves(200, 0.3, seed=1)
     one, other = build_corridor(curves), build_corridor(curves, "components")
     for name in ("lower", "median", "upper"):
         ratio = getattr(one, name).force[1:] / getattr(other, name).force[1:]
-        np.testing.assert_allclose(np.log(ratio), 0.0, atol=4.0 * 0.1 * 0.3)
+        np.testing.assert_allclose(np.log(ratio), 0.0, atol=3.0 * 0.15 * 0.3)
 
 
 @st.composite

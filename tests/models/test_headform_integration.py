@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid, solve_ivp
 
+from models.criteria import clip_level, head_injury_criterion
 from models.criteria.units import STANDARD_GRAVITY
 from models.headform.model import SAMPLING_RATE
 from models.protocol import Run
@@ -168,7 +169,7 @@ def test_law_integrated_independently(change: dict[str, float]) -> None:
     derandomize=True,
     deadline=None,
     database=None,
-    max_examples=60,
+    max_examples=30,
     suppress_health_check=[HealthCheck.too_slow],
 )
 @given(
@@ -229,6 +230,20 @@ def test_histories_fit_each_other(run: Run) -> None:
     assert run.outputs["peak_head_acceleration"] == pytest.approx(resultant.max())
     assert run.outputs["hood_intrusion"] == pytest.approx(depth.max(), rel=1e-4)
     assert head["velocity_normal"][-1] == pytest.approx(-run.outputs["rebound_speed"], rel=1e-3)
+
+
+def test_criteria_are_those_of_the_histories() -> None:
+    # A soft hood: the pulse is longer than every window.
+    run = MODEL.run(CENTRE | {"hood_force_scale": 0.05, "hood_unloading_ratio": 1.2})
+    assert run.outputs["contact_duration"] > 0.04
+    head = run.histories["head"]
+    pulse = head.time, head.channels["acceleration"]
+    for name, window in (("hic15", 0.015), ("hic36", 0.036)):
+        assert run.outputs[name] == pytest.approx(head_injury_criterion(*pulse, window)[0])
+    assert run.outputs["hic36"] > 1.01 * head_injury_criterion(*pulse, 0.03)[0]
+    assert run.outputs["clip_3ms"] == pytest.approx(clip_level(*pulse))
+    consecutive = clip_level(*pulse, mode="consecutive")
+    assert run.outputs["clip_3ms_consecutive"] == pytest.approx(consecutive)
 
 
 def test_energy_lost_is_the_area_between_the_branches() -> None:

@@ -171,7 +171,7 @@ def test_fitted_curve_gives_the_pulse_back(name: str, ratio: float, noise: float
 
 # -- intervals -------------------------------------------------------------------------------
 
-SEEDS = {"linear": 60, "hood": 60, "windscreen": 60, "stiffening": 20}
+SEEDS = {"linear": 60, "hood": 60, "windscreen": 30, "stiffening": 10}
 SPEED_SD = 0.03
 
 
@@ -224,9 +224,17 @@ def test_intervals_grow_with_the_uncertainty() -> None:
         fit = fit_stiffness(time, values, SPEED, MASS, draws=60, **changes)
         width.append(float((fit.force_high - fit.force_low)[-1]))
     assert all(wider > 1.5 * width[0] for wider in width[1:])
-    # The force is proportional to the mass: 2 % each way are 4 sd of the interval.
-    mass_part = 2.0 * 1.96 * 0.02 * fit.curve.force[-1]
-    assert width[3] > 0.7 * mass_part
+
+
+def test_interval_of_an_uncertain_mass_in_closed_form() -> None:
+    # The force is proportional to the mass, the penetration does not depend on it.
+    time, values = signal_of(simulate("linear", 6.0, SPEED))
+    fit = fit_stiffness(time, values, SPEED, MASS, mass_sd=0.04 * MASS, draws=800)
+    expected = 2.0 * 1.96 * 0.04 * fit.curve.force[-1]
+    # Quantiles of 800 draws: the standard error of their distance is 3.4 %.
+    width = fit.force_high[-1] - fit.force_low[-1]
+    assert width == pytest.approx(expected, rel=4.0 * 0.034)
+    assert fit.permanent.high - fit.permanent.low < 0.01 * fit.permanent.value
 
 
 def test_intervals_are_repeatable() -> None:
@@ -371,3 +379,13 @@ def test_number_of_knots_is_two_to_eight(knots: int) -> None:
     with pytest.raises(ValueError, match="2 to 8"):
         fit_stiffness(time, values, SPEED, MASS, knots=knots, draws=0)
     assert fit_stiffness(time, values, SPEED, MASS, knots=2, draws=0).curve.force.size == 2
+
+
+@pytest.mark.xfail(
+    strict=True, raises=pytest.fail.Exception, reason="a rebound faster than the impact is fitted"
+)
+def test_a_speed_that_the_signal_contradicts_is_refused() -> None:
+    # 8.5 km/h for 8.5 m/s: the headform would leave three times as fast as it came.
+    time, values = noisy("hood", 1)
+    with pytest.raises(ValueError, match="speed"):
+        fit_stiffness(time, values, SPEED / 3.6, MASS, draws=0)

@@ -79,9 +79,9 @@ def read_test(path: Path) -> Test:
         raise UserError(f"{folder}: holds no channels of {path.stem}")
     return Test(
         name=path.stem,
-        title=header.get("title", ""),
-        velocity=_number(header, "velocity test object 1"),
-        mass=_number(header, "mass test object 1", "mass of test object 1"),
+        title="" if header.get("title", MISSING).upper() == MISSING else header["title"],
+        velocity=_number(path, header, "m/s", "velocity test object 1"),
+        mass=_number(path, header, "kg", "mass test object 1", "mass of test object 1"),
         channels=tuple(_channel(file) for file in files),
     )
 
@@ -111,6 +111,8 @@ def head_acceleration(test: Test) -> Channel:
         )
     if any(p.time.shape != parts[0].time.shape or np.any(p.time != parts[0].time) for p in parts):
         raise UserError(f"{test.name}: the head acceleration's components differ in time")
+    if len({part.filter for part in parts}) > 1:
+        raise UserError(f"{test.name}: the head acceleration's components are filtered differently")
     try:
         values = np.array([part.values * units.factor(part.unit, "g") for part in parts])
     except ValueError as error:
@@ -204,9 +206,14 @@ def _write(path: Path, header: Mapping[str, str], samples: Array | None = None) 
 
 def _lines(path: Path) -> list[str]:
     try:
-        return path.read_text(encoding="utf-8", errors="replace").splitlines()
+        raw = path.read_bytes()
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error})") from None
+    try:
+        return raw.decode("utf-8").splitlines()
+    except UnicodeDecodeError:
+        # Older programs write the Western code page.
+        return raw.decode("latin-1").splitlines()
 
 
 def _header(lines: list[str]) -> dict[str, str]:
@@ -215,13 +222,20 @@ def _header(lines: list[str]) -> dict[str, str]:
     return {key.strip().lower(): value.strip() for key, _, value in pairs}
 
 
-def _number(header: Mapping[str, str], *names: str) -> float:
-    """Return the first of the named values, NaN if none is given; a unit may follow it."""
+def _number(path: Path, header: Mapping[str, str], unit: str, *names: str) -> float:
+    """Return the first of the named values in ``unit``, NaN if none is given.
+
+    A unit may follow the number.
+    """
     for name in names:
         text = header.get(name, MISSING)
-        match = re.match(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", text)
-        if match:
-            return float(match.group())
+        if text.upper() in ("", MISSING):
+            continue
+        value, _, given = text.partition(" ")
+        try:
+            return float(value) * (units.factor(given.strip(), unit) if given.strip() else 1.0)
+        except ValueError:
+            raise UserError(f"{path}: {name!r} is {text[:40]!r}, not a number in {unit}") from None
     return np.nan
 
 
@@ -237,11 +251,15 @@ def _channel(path: Path) -> Channel:
         values = np.array([np.nan if s == MISSING else float(s) for s in samples])
     except ValueError as error:
         raise UserError(f"{path}: {error}") from None
-    interval, start = _number(header, "sampling interval"), _number(header, "time of first sample")
+    interval = _number(path, header, "s", "sampling interval")
+    start = _number(path, header, "s", "time of first sample")
+    count = _number(path, header, "1", "number of samples")
     if not interval > 0.0 or not np.isfinite(start):
         raise UserError(f"{path}: 'Sampling interval' and 'Time of first sample' must be given")
     if values.size < 2:
         raise UserError(f"{path}: holds no samples")
+    if np.isfinite(count) and count != values.size:
+        raise UserError(f"{path}: holds {values.size} samples, its header says {count:g}")
     unit = header.get("unit", "1")
     time: Array = start + interval * np.arange(values.size, dtype=np.float64)
     return Channel(code, _UNITS.get(unit, unit), time, values)

@@ -10,11 +10,12 @@ A signal is named after the model's history that it measures, ``<group>_<channel
 ``head_acceleration``. Folders of ISO-MME tests are read into the same structure.
 """
 
+import csv
 import re
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -156,6 +157,8 @@ def _read_folder(folder: Path) -> Measured:
         raise UserError(f"{place}: {first_problem(error)}") from None
     except (OSError, ValueError, RecursionError) as error:
         raise UserError(f"{place}: cannot be read ({error})") from None
+    if "test" in {*header.inputs, *header.scalars}:
+        raise UserError(f"{place}: 'test' is the id of a test, it cannot be an input or a scalar")
     tests = _read_csv(folder / "tests.csv", text=("test",))
     for column in ("test", *header.inputs, *header.scalars):
         if column not in tests.columns:
@@ -193,17 +196,31 @@ def _series(path: Path, frame: pd.DataFrame, name: str) -> Array:
 
 
 def _read_csv(path: Path, text: tuple[str, ...] = ()) -> pd.DataFrame:
+    """Return a table of numbers (NaN where empty) and of the columns that are text."""
     try:
-        frame = pd.read_csv(path, dtype=dict.fromkeys(text, str))
-    except (OSError, ValueError) as error:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = list(csv.reader(file, strict=True))
+    except (OSError, ValueError, csv.Error) as error:
         raise UserError(f"{path}: cannot be read ({error})") from None
-    for column in frame.columns:
-        if column not in text:
-            try:
-                frame[column] = pd.to_numeric(frame[column])
-            except (ValueError, TypeError):
-                raise UserError(f"{path}: column {column!r} must hold numbers") from None
-    return frame
+    head, *body = rows or [[]]
+    if not head or len(set(head)) < len(head):
+        raise UserError(f"{path}: the first line must name the columns, each once")
+    body = [row for row in body if row]
+    for number, row in enumerate(body, start=2):
+        if len(row) != len(head):
+            raise UserError(f"{path}: line {number} has {len(row)} fields, not {len(head)}")
+    columns: dict[str, Any] = {}
+    for name, values in zip(
+        head, zip(*body, strict=True) if body else [()] * len(head), strict=True
+    ):
+        if name in text:
+            columns[name] = values
+            continue
+        try:
+            columns[name] = np.array([float(v) if v.strip() else np.nan for v in values])
+        except ValueError:
+            raise UserError(f"{path}: column {name!r} must hold numbers") from None
+    return pd.DataFrame(columns)
 
 
 def _from_isomme(folder: Path, tests: list[isomme.Test]) -> Measured:

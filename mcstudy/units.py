@@ -27,6 +27,7 @@ _UNITS: dict[str, tuple[str, float]] = {
     "N": ("force", 1.0),
     "kN": ("force", 1000.0),
     "J": ("energy", 1.0),
+    "N s/m": ("damping", 1.0),
 }
 
 

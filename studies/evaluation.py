@@ -16,10 +16,12 @@ class ModelArgument(TypedDict):
 
     name: str
     options: dict[str, Any]
+    version: str
 
 
 @functools.lru_cache(maxsize=4)
-def _model(name: str, options: str) -> Model:
+def _model(name: str, options: str, version: str) -> Model:
+    # The version tells two states of a file that an option names apart.
     return load_model(name, json.loads(options))
 
 
@@ -27,6 +29,8 @@ def evaluate(
     argument: ModelArgument, rows: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], list[str]]:
     """Run rows of inputs and return outputs and statuses."""
-    model = _model(argument["name"], json.dumps(argument["options"], sort_keys=True))
+    model = _model(
+        argument["name"], json.dumps(argument["options"], sort_keys=True), argument["version"]
+    )
     batch = model.run_batch(rows)
     return batch.outputs, batch.status

@@ -82,7 +82,11 @@ def run_monte_carlo(
     rows = np.stack([columns[item.name] for item in model.inputs], axis=1)
     task = runner.Task(
         evaluate=evaluation.evaluate,
-        argument={"name": study.model.name, "options": study.model.options},
+        argument={
+            "name": study.model.name,
+            "options": study.model.options,
+            "version": model.version,
+        },
         inputs=rows,
         input_names=[item.name for item in model.inputs],
         output_names=[item.name for item in model.outputs],

@@ -35,6 +35,19 @@ class Corridor:
     median: ForceCurve
     upper: ForceCurve
 
+    def __post_init__(self) -> None:
+        for name, bound in (("lower", self.lower), ("upper", self.upper)):
+            count = np.union1d(self.median.penetration, bound.penetration).size
+            if count > MOST_KNOTS:
+                raise ValueError(
+                    f"median and {name} have {count} different knots, {MOST_KNOTS} are possible"
+                )
+        depth = np.concatenate([c.penetration for c in (self.lower, self.median, self.upper)])
+        lower, median, upper = (c.at(depth) for c in (self.lower, self.median, self.upper))
+        slack = 1e-9 * upper.max()
+        if np.any(lower > median + slack) or np.any(median > upper + slack):
+            raise ValueError("the curves cross: lower, median and upper must not change places")
+
     def curve(self, coordinate: float) -> ForceCurve:
         """Return the curve at a coordinate: 0 lower, 0.5 median, 1 upper.
 
@@ -73,6 +86,8 @@ def read_corridor(row: Mapping[str, Any]) -> Corridor:
     def curve(key: str) -> ForceCurve:
         try:
             knots = np.array(row[key], dtype=np.float64)
+            if knots.ndim != 2 or knots.shape[1] != 2:
+                raise ValueError("must be a list of pairs [penetration m, force N]")
             return ForceCurve(
                 knots[:, 0].copy(),
                 knots[:, 1].copy(),
@@ -100,6 +115,8 @@ def load_corridors(name: str) -> dict[str, Corridor]:
     ValueError
         If there is no such file or something in it is wrong.
     """
+    if not isinstance(name, str):
+        raise ValueError(f"corridor must be a name or the path of a file, given {name!r}")
     try:
         if name.endswith(".toml"):
             table = tomllib.loads(Path(name).read_text(encoding="utf-8"))
@@ -112,7 +129,7 @@ def load_corridors(name: str) -> dict[str, Corridor]:
         if not isinstance(zones, dict) or not all(isinstance(row, dict) for row in zones.values()):
             raise ValueError("has no tables [zones.<name>]")
         return {zone: read_corridor(row) for zone, row in zones.items()}
-    except (OSError, UnicodeDecodeError, ValueError) as error:
+    except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
         raise ValueError(f"corridor {name!r}: {error}") from None
 
 
@@ -155,11 +172,15 @@ def build_corridor(curves: Sequence[ForceCurve], method: str = "quantiles") -> C
         reach *= np.sign(reach.sum()) or 1.0
         # Exponentials of a sum of shapes need not rise; a law must.
         bounds = np.maximum.accumulate(np.exp(mean + np.array([[-1.0], [0.0], [1.0]]) * reach), 1)
+        # Where the component changes sign the bounds change places.
+        bounds = np.sort(bounds, axis=0)
     depth = np.concatenate([[0.0], grid])
     forces = np.pad(bounds, ((0, 0), (1, 0)))
     knots = choose_knots(depth, forces[1], MOST_KNOTS)
     ratio = float(np.median([curve.unloading_ratio for curve in curves]))
-    return Corridor(*(ForceCurve(knots, fit_loading(depth, f, knots), ratio) for f in forces))
+    # Least squares may leave bounds crossed by a hair.
+    fitted = np.sort([fit_loading(depth, f, knots) for f in forces], axis=0)
+    return Corridor(*(ForceCurve(knots, f, ratio) for f in fitted))
 
 
 def corridor_text(corridor: Corridor, zone: str, title: str, source: str) -> str:
@@ -173,10 +194,10 @@ def corridor_text(corridor: Corridor, zone: str, title: str, source: str) -> str
         [
             "# Stiffness corridor: [penetration m, force N] at the lower, median and upper bound.",
             "",
-            f"title = {json.dumps(title)}",
-            f"source = {json.dumps(source)}",
+            f"title = {_quoted(title)}",
+            f"source = {_quoted(source)}",
             "",
-            f"[zones.{json.dumps(zone)}]",
+            f"[zones.{_quoted(zone)}]",
             f"unloading_ratio = {corridor.median.unloading_ratio:.6g}",
             f"damping = {corridor.median.damping:.6g}",
             f"lower = {knots(corridor.lower)}",
@@ -185,3 +206,8 @@ def corridor_text(corridor: Corridor, zone: str, title: str, source: str) -> str
             "",
         ]
     )
+
+
+def _quoted(text: str) -> str:
+    """Return a TOML basic string: as in JSON, but for characters that TOML wants as they are."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")

@@ -10,6 +10,8 @@ MOST_KNOTS = 8
 """Knots that a loading curve may have."""
 SPACING = 0.08
 """Least distance of knots over the largest penetration (assumed)."""
+SWEEPS = 4
+"""Rounds in which each knot is moved once."""
 FLATTEST = 1e-3
 """Least slope of a fitted segment over the secant of the whole curve: a law must rise."""
 
@@ -53,24 +55,62 @@ def choose_knots(
         raise ValueError(f"a loading curve has 2 to {MOST_KNOTS} knots, given {most}")
     n = max(float(independent_samples or depth.size), 4.0)
     end = float(depth.max())
-    candidates = end * np.arange(SPACING, 1.0 - 0.5 * SPACING, 0.5 * SPACING)
+    grid = end * np.arange(SPACING, 1.0 - 0.5 * SPACING, 0.5 * SPACING)
     places = np.array([0.0, end])
-
-    def squares(knots: Array) -> float:
-        fitted = np.interp(depth, knots, fit_loading(depth, force, knots))
-        return float(np.mean((force - fitted) ** 2)) + (1e-6 * float(force.max())) ** 2
-
-    score = n * np.log(squares(places))
+    score = n * np.log(_misfit(depth, force, places))
     while places.size < most:
-        free = [c for c in candidates if np.abs(places - c).min() >= SPACING * end * 0.999]
-        if not free:
+        trials = [t for c in grid for t in (np.sort(np.append(places, c)),) if _is_spaced(t)]
+        if not trials:
             break
-        trials = [np.sort(np.append(places, c)) for c in free]
-        found = [squares(trial) for trial in trials]
-        best = int(np.argmin(found))
+        best = min(trials, key=lambda trial: _misfit(depth, force, trial))
+        best = refine_knots(depth, force, best, grid)
+        best = refine_knots(depth, force, best)
         # A knot costs two parameters: where it lies and its force.
-        trial_score = n * np.log(found[best]) + 2.0 * np.log(n) * (places.size - 1)
-        if trial_score >= score:
+        cost = 2.0 * np.log(n) * (best.size - 2)
+        found = n * np.log(_misfit(depth, force, best)) + cost
+        if found >= score:
             break
-        places, score = trials[best], trial_score
+        places, score = best, found
     return places
+
+
+def refine_knots(depth: Array, force: Array, places: Array, grid: Array | None = None) -> Array:
+    """Return knots whose inner ones are moved, one at a time, to where the fit is best.
+
+    Parameters
+    ----------
+    depth, force : (n,) m and N. places : (k,) m, knots to start from.
+    grid : where a knot may go; by default within half a spacing of where it is.
+    """
+    end = float(places[-1])
+    best = _misfit(depth, force, places)
+    for _ in range(SWEEPS):
+        before = best
+        for k in range(1, places.size - 1):
+            if grid is None:
+                steps = end * SPACING * np.array([-0.5, -0.25, -0.1, 0.1, 0.25, 0.5])
+                candidates = places[k] + steps
+            else:
+                candidates = grid
+            for candidate in candidates:
+                trial = places.copy()
+                trial[k] = candidate
+                if not _is_spaced(trial):
+                    continue
+                misfit = _misfit(depth, force, trial)
+                if misfit < best:
+                    best, places = misfit, trial
+        if best >= before * (1.0 - 1e-6):
+            break
+    return places
+
+
+def _is_spaced(places: Array) -> bool:
+    return bool(np.diff(places).min() >= 0.999 * SPACING * places[-1])
+
+
+def _misfit(depth: Array, force: Array, places: Array) -> float:
+    """Return the mean square of what a curve with these knots leaves over."""
+    fitted = np.interp(depth, places, fit_loading(depth, force, places))
+    # What rounding leaves of an exact fit is no misfit.
+    return float(np.mean((force - fitted) ** 2)) + (1e-6 * float(force.max())) ** 2

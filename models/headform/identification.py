@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from models.contact.law import ForceCurve
-from models.contact.loading import choose_knots, fit_loading
+from models.contact.loading import choose_knots, fit_loading, refine_knots
 from models.criteria.filters import CUTOFF_FACTOR, filter_cfc
 from models.criteria.units import STANDARD_GRAVITY
 
@@ -22,9 +22,17 @@ Array = NDArray[np.float64]
 
 CHANNEL_CLASS = 1000.0
 """Channel frequency class of head acceleration (SAE J211)."""
-FLANK = (0.05, 0.25)
-"""Shares of the peak between which the rising flank is taken as straight; its extension to zero is
-first contact (assumed)."""
+RISE = (0.00015, 0.0006)
+"""s after the signal has risen out of its noise: this part of the flank, beyond what the filter
+rounds and before the force curve bends, is extended to zero for first contact (assumed)."""
+FAR, NEAR = 0.25, 0.05
+"""Shares of the peak from which the part before contact is sought, at first and at last."""
+OUT_OF_NOISE = 3.0
+"""Standard deviations that a signal has risen by when it is out of its noise."""
+SLOW = 0.06
+"""Share of the peak up to which a slow start is followed (assumed)."""
+LEAST_RISE = 0.02
+"""Share of the peak that a signal has risen by at least: less is the filter's tail (assumed)."""
 QUIET = 0.002
 """s before the flank from which on a sample no longer counts as before contact (assumed)."""
 FEWEST_QUIET = 10
@@ -32,6 +40,9 @@ FEWEST_QUIET = 10
 UNLOADED = 0.05
 """Share of the force at the largest penetration below which unloading is not fitted: contact ends
 in the filter's tail (assumed)."""
+FASTEST_REBOUND = 1.1
+"""Rebound speed over impact speed beyond which a test is refused: contact gives no
+energy, but speed is not known exactly (assumed)."""
 CONFIDENCE = 0.95
 
 
@@ -57,6 +68,12 @@ class Loop:
     def deepest(self) -> int:
         """Sample of the largest penetration."""
         return int(np.argmax(self.penetration))
+
+    @property
+    def loading(self) -> tuple[Array, Array]:
+        """Penetration and force up to the largest penetration."""
+        end = self.deepest + 1
+        return self.penetration[:end], self.force[:end]
 
 
 @dataclass(frozen=True)
@@ -113,14 +130,17 @@ def force_penetration(time: ArrayLike, acceleration: ArrayLike, speed: float, ma
     peak = int(np.argmax(a))
     if not a[peak] > 0.0:
         raise ValueError("the signal holds no impact: its largest value is not positive")
-    start = _crossing(t, a, peak, FLANK[0])
-    quiet = a[t < start - QUIET]
     offset, noise = 0.0, np.nan
-    if quiet.size >= FEWEST_QUIET:
-        offset, noise = float(quiet.mean()), float(quiet.std(ddof=1))
+    # An offset moves the crossings from which it is sought: seek twice, from far and from near.
+    for share in (FAR, NEAR):
+        start = _crossing(t, a - offset, peak, share)
+        quiet = a[t < start - QUIET]
+        if quiet.size >= FEWEST_QUIET:
+            offset, noise = float(quiet.mean()), float(quiet.std(ddof=1))
     a = a - offset
-    low, high = (_crossing(t, a, peak, share) for share in FLANK)
-    onset = low - (high - low) * FLANK[0] / (FLANK[1] - FLANK[0])
+    if not a[peak] > 0.0:
+        raise ValueError("the signal holds no impact above its offset")
+    onset = _first_contact(t, a, peak, noise)
     later = t > onset
     t = np.concatenate([[onset], t[later]]) - onset
     a = np.concatenate([[0.0], a[later]])
@@ -130,12 +150,30 @@ def force_penetration(time: ArrayLike, acceleration: ArrayLike, speed: float, ma
     if deepest >= t.size - 3:
         raise ValueError(
             "the signal ends before the headform rebounds: its impulse does not stop "
-            f"{mass:g} kg at {speed:g} m/s (check mass, speed, unit and length)"
+            f"{speed:g} m/s (check speed, unit and length)"
         )
     force = mass * STANDARD_GRAVITY * a
     over = np.flatnonzero(force[deepest:] < 0.5 * UNLOADED * force[deepest])
     end = deepest + int(over[0]) + 1 if over.size else t.size
+    if -rate[end - 1] > FASTEST_REBOUND * speed:
+        raise ValueError(
+            f"the headform would rebound at {-rate[end - 1]:.3g} m/s, faster than it came "
+            f"({speed:g} m/s): check speed, unit and offset"
+        )
     return Loop(t[:end], depth[:end], force[:end], float(onset), offset, noise)
+
+
+def _first_contact(t: Array, a: Array, peak: int, noise: float) -> float:
+    """Return when contact began: the flank just out of the noise, extended to zero."""
+    level = OUT_OF_NOISE * noise / a[peak] if np.isfinite(noise) else 0.0
+    risen = _crossing(t, a, peak, min(max(level, LEAST_RISE), FAR))
+    # A slow start is known the better the longer it is followed.
+    last = max(risen + RISE[1], _crossing(t, a, peak, SLOW))
+    places = np.linspace(risen + RISE[0], last, 9)
+    slope, start = np.polyfit(places, np.interp(places, t, a), 1)
+    if not slope > 0.0:
+        return risen
+    return float(min(-start / slope, risen))
 
 
 def _crossing(t: Array, a: Array, peak: int, share: float) -> float:
@@ -192,8 +230,7 @@ def fit_stiffness(
     loop = force_penetration(t, a, speed, mass)
     deepest = loop.deepest
     places = choose_knots(
-        loop.penetration[: deepest + 1],
-        loop.force[: deepest + 1],
+        *loop.loading,
         knots,
         independent_samples=2.0 * CUTOFF_FACTOR * CHANNEL_CLASS * loop.time[deepest],
     )
@@ -211,7 +248,9 @@ def fit_stiffness(
         m = mass + mass_sd * float(np.clip(rng.standard_normal(), -4.0, 4.0))
         try:
             again = force_penetration(t, copy, v, m)
-            f, r = _fit_law(again, places)
+            moved = refine_knots(*again.loading, places)
+            f, r = _fit_law(again, moved)
+            f = ForceCurve(moved, f, r).at(places)
         except ValueError:
             continue
         depth = again.penetration[again.deepest]

@@ -17,8 +17,8 @@ NORMAL, TANGENTIAL, PENETRATION, RATE, SLIDE, SPIN = range(6)
 COLUMNS = 6
 
 # Entries of the summary.
-SAMPLES, DEEPEST, END_TIME, REBOUND, SPENT = range(5)
-SUMMARY = 5
+SAMPLES, DEEPEST, END_TIME, REBOUND, END_SLIDE, END_SPIN, SPENT = range(7)
+SUMMARY = 7
 
 
 class Impactor(NamedTuple):
@@ -94,4 +94,6 @@ def strike(impactor, surface, laws, count, rate, slide, step, stride, record, su
     summary[SAMPLES] = float(samples)
     summary[DEEPEST] = deepest
     summary[REBOUND] = -rate
+    summary[END_SLIDE] = slide
+    summary[END_SPIN] = spin
     summary[SPENT] = spent

@@ -9,7 +9,7 @@ from joblib import Parallel, delayed
 
 from models.protocol import complete_inputs
 from models.registry import load_model
-from studies.evaluation import evaluate
+from studies.evaluation import ModelArgument, evaluate
 
 CHUNK = 12
 """Runs a task."""
@@ -26,7 +26,11 @@ def sweep(
     loaded = load_model(model, options)
     names = [item.name for item in loaded.inputs]
     rows = np.array([[complete_inputs(loaded, case)[name] for name in names] for case in cases])
-    argument = {"name": model, "options": dict(options or {})}
+    argument: ModelArgument = {
+        "name": model,
+        "options": dict(options or {}),
+        "version": loaded.version,
+    }
     parts = [rows[k : k + CHUNK] for k in range(0, len(rows), CHUNK)]
     found = Parallel(n_jobs=workers)(delayed(evaluate)(argument, part) for part in parts)
     table = pd.DataFrame(rows, columns=names)

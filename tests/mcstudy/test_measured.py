@@ -180,13 +180,6 @@ NUMBERS = "time,head_acceleration,hood_force\n" + "0.1,1,1\n" * 20
 BINARY = bytes(range(256))
 
 
-def crash(error: type[Exception]) -> pytest.MarkDecorator:
-    reason = "an exception that is no UserError gets through"
-    return pytest.mark.xfail(strict=True, raises=error, reason=reason)
-
-
-SILENT = pytest.mark.xfail(strict=True, raises=pytest.fail.Exception, reason="read without a word")
-
 DAMAGE: dict[str, tuple[dict[str, Any], str]] = {
     "no tests.csv": ({"tests.csv": None}, "tests.csv: cannot be read"),
     "no signal": ({SIGNAL: None}, "A-1.csv: cannot be read"),
@@ -208,11 +201,11 @@ DAMAGE: dict[str, tuple[dict[str, Any], str]] = {
     "bad distribution": (changed("measured.toml", "lognormal", "gauss"), "uncertain.hood_force"),
     "title a number": (changed("measured.toml", 'title = "Hood B, child headform, 2 tests"',
                                "title = 3"), "measured.toml: title"),
-    "tests empty": ({"tests.csv": ""}, "tests.csv: cannot be read"),
+    "tests empty": ({"tests.csv": ""}, "tests.csv: the first line must name"),
     "tests binary": ({"tests.csv": BINARY}, "tests.csv: cannot be read"),
     "tests utf-16": ({"tests.csv": TESTS.encode("utf-16")}, "tests.csv: cannot be read"),
     "tests cut": ({"tests.csv": TESTS.splitlines()[0]}, "tests.csv: holds no tests"),
-    "row cut": ({"tests.csv": TESTS[:-9]}, "column 'impact_speed' must be a number"),
+    "row cut": ({"tests.csv": TESTS[:-9]}, "tests.csv: line 3 has 1 fields, not 5"),
     "open quote": (changed("tests.csv", "A-1", '"A-1'), "tests.csv: cannot be read"),
     "semicolons": ({"tests.csv": TESTS.replace(",", ";")}, "tests.csv: "),
     "no id column": (changed("tests.csv", "test,", "id,"), "tests.csv: column "),
@@ -234,8 +227,8 @@ DAMAGE: dict[str, tuple[dict[str, Any], str]] = {
     "line break in id": (changed("tests.csv", "A-1", '"A\n1"'), "cannot name a file"),
     "null in id": (changed("tests.csv", "A-1", "A\0-1"), "cannot name a file"),
     "long id": (changed("tests.csv", "A-1", "x" * 5000), "cannot name a file"),
-    "signal empty": ({SIGNAL: ""}, "A-1.csv: cannot be read"),
-    "signal header only": ({SIGNAL: NUMBERS[:35]}, "A-1.csv: column .* only 0 samples"),
+    "signal empty": ({SIGNAL: ""}, "A-1.csv: the first line must name"),
+    "signal header only": ({SIGNAL: NUMBERS[:34]}, "A-1.csv: column .* only 0 samples"),
     "signal cut": ({SIGNAL: ramp(0.0, 1e-4, 7)}, "A-1.csv: column .* only 7 samples"),
     "signal binary": ({SIGNAL: BINARY}, "A-1.csv: cannot be read"),
     "signal without time": (changed(SIGNAL, "time,", "t,"), "A-1.csv: the first column must be"),
@@ -246,30 +239,23 @@ DAMAGE: dict[str, tuple[dict[str, Any], str]] = {
     "time jumps back": ({SIGNAL: ramp(0.0, 1e-4, 50) + "0.001,1,1\n"}, "A-1.csv: time must rise"),
     "text in a signal": ({SIGNAL: ramp(0.0, 1e-4, 50) + "0.1,abc,1\n"}, "'head_acceleration' must"),
     "text in time": ({SIGNAL: ramp(0.0, 1e-4, 50) + "now,1,1\n"}, "column 'time' must hold"),
-    "ragged": ({SIGNAL: ramp(0.0, 1e-4, 50) + "0.1,1,1,1,1\n"}, "A-1.csv: cannot be read"),
+    "ragged": ({SIGNAL: ramp(0.0, 1e-4, 50) + "0.1,1,1,1,1\n"}, "A-1.csv: line 52 has 5 fields"),
     "only nan": ({SIGNAL: NUMBERS.replace("0.1,1", "0.1,nan")}, "A-1.csv: .* only 0 samples"),
-}  # fmt: skip
-
-FOUND_OUT: dict[str, tuple[dict[str, Any], str, Any]] = {
-    "empty id": (changed("tests.csv", "A-1", ""), "tests.csv: ", crash(TypeError)),
-    "input called test": (changed("measured.toml", "inputs.impact_angle", "inputs.test"), "",
-                          crash(TypeError)),
-    "huge number": (changed("tests.csv", "A-1,30", "A-1,1" + "0" * 400), "tests.csv: ",
-                    crash(OverflowError)),
+    "empty id": (changed("tests.csv", "A-1", ""), "tests.csv: "),
+    "input called test": (changed("measured.toml", "inputs.impact_angle", "inputs.test"), ""),
+    "huge number": (changed("tests.csv", "A-1,30", "A-1,1" + "0" * 400), "tests.csv: "),
     "a switch": ({"tests.csv": TESTS.replace("A-1,30", "A-1,True").replace("B.2,40", "B.2,False")},
-                 "column 'impact_speed'", SILENT),
-    # Laboratories' files end rows in a separator: pandas takes the first column for an index then.
+                 "column 'impact_speed'"),
+    # Laboratories' files end rows in a separator: a reader must not take the first for an index.
     "a column more in each row": (
         {SIGNAL: "time,head_acceleration,hood_force\n"
-                 + "".join(f"{k}e-4,{k},{k},{k}\n" for k in range(50))}, "A-1.csv: ", SILENT),
+                 + "".join(f"{k}e-4,{k},{k},{k}\n" for k in range(50))},
+        "A-1.csv: line 2 has 4 fields"),
 }  # fmt: skip
-CASES = [(name, *case) for name, case in DAMAGE.items()] + [
-    pytest.param(name, files, message, marks=mark)
-    for name, (files, message, mark) in FOUND_OUT.items()
-]
+CASES = [(name, *case) for name, case in DAMAGE.items()]
 
 
-@pytest.mark.parametrize(("name", "files", "message"), CASES, ids=[*DAMAGE, *FOUND_OUT])
+@pytest.mark.parametrize(("name", "files", "message"), CASES, ids=list(DAMAGE))
 def test_damage_is_told_in_one_line_that_names_the_place(
     tmp_path: Path, name: str, files: dict[str, Any], message: str
 ) -> None:
@@ -281,7 +267,6 @@ def test_damage_is_told_in_one_line_that_names_the_place(
 
 
 @pytest.mark.parametrize("test", ["NA", "None", "nan", "null"])
-@pytest.mark.xfail(strict=True, raises=TypeError, reason="pandas takes them for missing values")
 def test_ids_that_look_like_missing_values(tmp_path: Path, test: str) -> None:
     files = changed("tests.csv", "A-1", test) | {f"signals/{test}.csv": FILES[SIGNAL]}
     assert list(load(tmp_path, **files).signals) == [test, "B.2"]

@@ -28,11 +28,15 @@ TOES = {
     "short toe": [[0.0, 0.0], [0.005, 300.0], [0.02, 2500.0], [0.08, 5000.0]],
     "stiffening": [[0.0, 0.0], [0.02, 600.0], [0.04, 2500.0], [0.06, 7000.0]],
 }
-LATE = pytest.mark.xfail(
-    strict=True,
-    reason="first contact is taken where the flank of 5 to 25 % meets zero: late for a soft toe",
+SHORT = pytest.mark.xfail(
+    strict=True, reason="a toe of 5 mm lasts 0.6 ms: the flank that gives first contact is longer"
 )
-SHAPES = [*CURVES, *(pytest.param(name, marks=LATE) for name in TOES)]
+SOFT = pytest.mark.xfail(
+    strict=True,
+    reason="a start of 30 kN/m rises by 10 g in a millisecond: with noise of 1 g first contact is "
+    "known to about 0.1 ms, and the intervals hold the truth in 77 to 80 of 100",
+)
+SHAPES = [*CURVES, "stiffening", pytest.param("short toe", marks=SHORT)]
 
 
 def true_curve(name: str, ratio: float = 6.0) -> ForceCurve:
@@ -136,12 +140,14 @@ def test_recovers_a_curve_from_a_clean_signal(name: str, ratio: float) -> None:
     assert np.isnan(fit.force_low).all() and math.isnan(fit.permanent.low)
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("name", SHAPES)
-def test_recovers_a_curve_from_noise(name: str, seed: int) -> None:
-    fit = fit_stiffness(*noisy(name, seed), SPEED, MASS, draws=0)
+@pytest.mark.parametrize(
+    "name",
+    [*CURVES, pytest.param("short toe", marks=SHORT), pytest.param("stiffening", marks=SOFT)],
+)
+def test_recovers_a_curve_from_noise(name: str) -> None:
+    fits = [fit_stiffness(*noisy(name, seed), SPEED, MASS, draws=0) for seed in range(6)]
     # The whole curve is known better than the force in a single sample.
-    error = np.sqrt(np.mean(gaps(fit, name, 6.0) ** 2))
+    error = np.sqrt(np.mean([gaps(fit, name, 6.0) ** 2 for fit in fits]))
     assert error < 1.0 * MASS * STANDARD_GRAVITY
 
 
@@ -171,7 +177,7 @@ def test_fitted_curve_gives_the_pulse_back(name: str, ratio: float, noise: float
 
 # -- intervals -------------------------------------------------------------------------------
 
-SEEDS = {"linear": 60, "hood": 60, "windscreen": 30, "stiffening": 10}
+SEEDS = {"linear": 40, "hood": 40, "windscreen": 20, "stiffening": 10}
 SPEED_SD = 0.03
 
 
@@ -195,24 +201,18 @@ def coverage(name: str) -> dict[str, float]:
     return {key: float(np.mean(found)) for key, found in hits.items()}
 
 
-NARROW = pytest.mark.xfail(
-    strict=True,
-    reason="the knots stay in the repetitions, and beside the corners: intervals too narrow there",
-)
 COVERED: list[Any] = [
     *((name, key) for name in ("linear", "hood", "windscreen")
       for key in ("unloading_ratio", "permanent")),
-    ("linear", "all knots"),
-    pytest.param("hood", "inner knots", marks=NARROW),
-    pytest.param("windscreen", "inner knots", marks=NARROW),
-    *(pytest.param("stiffening", key, marks=LATE)
-      for key in ("all knots", "unloading_ratio", "permanent")),
+    *((name, "all knots") for name in ("linear", "hood", "windscreen")),
+    ("stiffening", "unloading_ratio"),
+    *(pytest.param("stiffening", key, marks=SOFT) for key in ("all knots", "permanent")),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("name", "key"), COVERED)
 def test_intervals_hold_the_truth(name: str, key: str) -> None:
-    # 95 of 100 by intention; 60 tests leave a standard error of 3.
+    # 95 of 100 by intention; 40 tests leave a standard error of 3 to 4.
     found = coverage(name)[key]
     assert 0.85 <= found <= 1.0, f"{name}, {key}: {100.0 * found:.0f} % of the intervals"
 
@@ -250,10 +250,6 @@ def test_intervals_are_repeatable() -> None:
 
 # -- what does not matter --------------------------------------------------------------------
 
-UNSEEN = pytest.mark.xfail(
-    strict=True, reason="an offset above 5 % of the peak hides the part before contact"
-)
-
 
 @pytest.mark.parametrize(
     ("offset", "start", "lead"),
@@ -264,8 +260,8 @@ UNSEEN = pytest.mark.xfail(
         (-8.0, 0.0, 0),
         (0.0, 0.0, 400),
         (2.5, 7.0, 3000),
-        pytest.param(8.0, 0.0, 0, marks=UNSEEN),
-        pytest.param(25.0, 0.0, 0, marks=UNSEEN),
+        (8.0, 0.0, 0),
+        (25.0, 0.0, 0),
     ],
 )
 def test_offset_and_lead_in_do_not_matter(offset: float, start: float, lead: int) -> None:
@@ -360,7 +356,7 @@ def spoiled(how: str) -> tuple[Array, Array, float, float]:
         ("backwards", "uniformly"),
         ("nan", "finite"),
         ("nan time", "finite|rise|uniformly"),
-        ("fast", "ends before the headform rebounds.*check mass, speed"),
+        ("fast", "ends before the headform rebounds.*check speed"),
         ("no speed", "positive"),
         ("nan speed", "positive"),
         ("negative mass", "positive"),
@@ -381,9 +377,6 @@ def test_number_of_knots_is_two_to_eight(knots: int) -> None:
     assert fit_stiffness(time, values, SPEED, MASS, knots=2, draws=0).curve.force.size == 2
 
 
-@pytest.mark.xfail(
-    strict=True, raises=pytest.fail.Exception, reason="a rebound faster than the impact is fitted"
-)
 def test_a_speed_that_the_signal_contradicts_is_refused() -> None:
     # 8.5 km/h for 8.5 m/s: the headform would leave three times as fast as it came.
     time, values = noisy("hood", 1)

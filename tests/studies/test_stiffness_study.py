@@ -92,14 +92,17 @@ def test_json_is_the_analysis(fitted: tuple[Path, dict[str, Any]]) -> None:
 
 def test_every_test_is_fitted_and_simulated_again(fitted: tuple[Path, dict[str, Any]]) -> None:
     speeds = dict(zip(NAMES, example_tests.SPEEDS, strict=True))
-    for name, entry in fitted[1]["analysis"]["tests"].items():
+    tests = fitted[1]["analysis"]["tests"]
+    # The data hide an unloading ratio of 7. Six intervals of 95 % hold it five times or more in 97
+    # of 100 sets of data.
+    ratios = [entry["unloading_ratio"] for entry in tests.values()]
+    assert sum(ratio["low"] < 7.0 < ratio["high"] for ratio in ratios) >= 5
+    for name, entry in tests.items():
         assert entry["impact_speed"] == speeds[name]
         assert entry["headform_mass"] == 2.5
         # Lead-in of 5 ms at 10 kHz; the offset of 0.4 g is known by 1 g over the root of 30.
         assert entry["onset"] == pytest.approx(0.0, abs=1e-4)
         assert entry["offset"] == pytest.approx(example_tests.OFFSET, abs=4.0 * 30.0**-0.5)
-        # The data hide an unloading ratio of 7.
-        assert entry["unloading_ratio"]["low"] < 7.0 < entry["unloading_ratio"]["high"]
         assert entry["permanent"]["value"] < entry["largest_penetration"]
         for quantity, (measured, simulated) in entry["measured_and_simulated"].items():
             assert simulated == pytest.approx(measured, rel=0.03), (name, quantity)
@@ -362,7 +365,6 @@ def test_options_of_a_study_that_do_not_fit_are_user_errors(tmp_path: Path) -> N
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.xfail(strict=True, raises=AttributeError, reason="load_corridors: .endswith of 5.0")
 def test_a_corridor_that_is_a_number_is_a_user_error(tmp_path: Path) -> None:
     path = tmp_path / "study.toml"
     begin, end = STUDY.index("{ hood_curve"), STUDY.index("[design]")
@@ -371,7 +373,6 @@ def test_a_corridor_that_is_a_number_is_a_user_error(tmp_path: Path) -> None:
         run_study(path, out=tmp_path / "out", workers=1)
 
 
-@pytest.mark.xfail(strict=True, raises=UserError, reason="mcstudy.units has no N s/m")
 def test_every_input_can_be_given_in_a_study(tmp_path: Path) -> None:
     path = tmp_path / "case.toml"
     fixed = "".join(
@@ -383,7 +384,6 @@ def test_every_input_can_be_given_in_a_study(tmp_path: Path) -> None:
     run_case(path, out=tmp_path / "out")
 
 
-@pytest.mark.xfail(strict=True, reason="the digest knows the file's name only")
 def test_an_edited_corridor_file_makes_another_study(tmp_path: Path) -> None:
     # A results folder refuses to go on with a study whose digest differs.
     corridor, path = tmp_path / "corridor.toml", tmp_path / "study.toml"

@@ -26,7 +26,17 @@ Folder = Annotated[Path, typer.Argument(help="Results folder.", show_default=Fal
 Out = Annotated[
     Path | None, typer.Option(help="Results folder; by default results/<name of the study>.")
 ]
-Workers = Annotated[int, typer.Option(help="Worker processes; -1 for one a core.")]
+
+
+def _check_workers(value: int) -> int:
+    if value == 0 or value < -1:
+        raise UserError(f"--workers must be 1 or more, or -1 for one a core, given {value}")
+    return value
+
+
+Workers = Annotated[
+    int, typer.Option(help="Worker processes; -1 for one a core.", callback=_check_workers)
+]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print no progress and no summary.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 

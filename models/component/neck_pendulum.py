@@ -102,7 +102,8 @@ def swing_neck(
     body, joints : whose head and neck hang on the pendulum.
     direction : {"flexion", "extension"}
     speed : m/s of the gauge when the stop is met.
-    pulse : (k, 2) s and m/s, what the gauge has lost by then; the last row reaches ``speed``.
+    pulse : (k, 2) s and m/s, what the gauge has lost by then; it begins with 0, 0 and the last row
+        reaches ``speed``.
 
     Raises
     ------
@@ -112,6 +113,8 @@ def swing_neck(
     if direction not in _FACING:
         raise ValueError(f"direction must be one of {', '.join(_FACING)}, given {direction!r}")
     pulse = np.asarray(pulse, dtype=np.float64)
+    if pulse[0, 0] != 0.0 or pulse[0, 1] != 0.0:
+        raise ValueError("the pulse must begin at 0 s with nothing lost")
     if not np.isclose(pulse[-1, 1], speed):
         raise ValueError(f"the pulse ends at {pulse[-1, 1]:g} m/s, not at the speed {speed:g} m/s")
     rows = [SEGMENTS.index("neck"), SEGMENTS.index("head")]
@@ -132,7 +135,8 @@ def swing_neck(
     motion.angular_velocity[:, 1] = -speed / GAUGE
     time: Array = np.arange(round(DURATION / STEP) + 1, dtype=np.float64) * STEP
     lost = np.interp(time, pulse[:, 0], pulse[:, 1])
-    rates = np.diff(lost, append=lost[-1]) / (STEP * GAUGE)
+    # Each step's loss at its end, with none at the start: the trapezoidal sum is the whole loss.
+    rates = np.diff(lost, prepend=0.0) / (STEP * GAUGE)
     out = np.zeros((time.size, 3))
     _swing(
         tree, held, motion, loads, np.zeros((n, 3)), np.zeros(3), np.zeros((n, 3)), np.zeros(3),

@@ -27,7 +27,7 @@ ARC_BORDER = 0.15
 ENTRY_DEPTH = 0.03
 """Depth (m) within which a segment must first be seen by a zone; deeper, it came past the border
 (beside the fender, from under the bumper) and is not in contact (assumed, ten times the way of a
-step)."""
+step), unless the zone beside in the same surface hands it over."""
 
 
 @inlined_kernel
@@ -55,7 +55,7 @@ def zone_separation(zones, ellipsoids, contacts, j, i, cx, cy, cz, cosine, sine)
     inner = zones.inner[j]
     if abs(cy) > half_width + reach + BORDER or abs(cy) < inner - reach - BORDER:
         return 1.0, 1.0, 0.0, 0.0, cx, cy, cz, 0.0
-    y = min(max(cy, -half_width), half_width)
+    y = min(max(cy, -zones.bend[j]), zones.bend[j])
     bend = zones.curvature[j] * y
     shift = 0.5 * bend * y
     # Horizontal normal e = (ex, ey) of the bent zone; its axis runs along (-ey, ex).
@@ -141,6 +141,10 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
             for j in range(count):
                 contacts.engaged[i, j] = False
             continue
+        # Whether a zone with one beside it held the segment at the last step.
+        handed = False
+        for j in range(count):
+            handed = handed or (zones.partner[j] >= 0 and contacts.engaged[i, j])
         for j in range(count):
             engaged = contacts.engaged[i, j]
             contacts.engaged[i, j] = False
@@ -157,7 +161,8 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
             if separation >= 0.0 or weight == 0.0:
                 continue
             penetration = -separation
-            if not engaged and penetration > ENTRY_DEPTH:
+            seen = engaged or (handed and zones.partner[j] >= 0)
+            if not seen and penetration > ENTRY_DEPTH:
                 continue
             contacts.engaged[i, j] = True
             if penetration > contacts.largest[i, j]:

@@ -16,8 +16,10 @@ from models.multibody.simulation import (
     S_FRAMES,
     S_REASON,
     S_RECORDS,
+    STABLE,
     SUMMARY,
     Settings,
+    damping_rate,
     empty_scratch,
     simulate,
     stable_ticks,
@@ -164,13 +166,19 @@ class MultibodyModel:
 
     def _step(self, crash: Crash, values: dict[str, float]) -> outcome.Raw:
         n, zones = len(SEGMENTS), len(self.vehicle.zones)
+        rate = damping_rate(crash.tree, crash.joints)
+        # A light body with stiff joints takes a finer step than asked for.
+        tick = self.tick / max(1, math.ceil(rate * self.tick / STABLE))
+        record = self._record
+        if tick < self.tick:
+            record = np.empty((int(TIME_LIMIT / tick) + 2, record.shape[1]))
         settings = Settings(
-            tick=self.tick,
-            coarse=stable_ticks(crash.tree, crash.joints, self.tick, COARSE),
-            flight=stable_ticks(crash.tree, crash.joints, self.tick, FLIGHT),
+            tick=tick,
+            coarse=stable_ticks(rate, tick, COARSE),
+            flight=stable_ticks(rate, tick, FLIGHT),
             time_limit=TIME_LIMIT,
-            step_limit=self._record.shape[0] - 1,
-            frame_every=round(FRAME_INTERVAL / self.tick),
+            step_limit=record.shape[0] - 1,
+            frame_every=round(FRAME_INTERVAL / tick),
             head=HEAD,
             trunk=max(TRUNK),
         )
@@ -178,12 +186,12 @@ class MultibodyModel:
         simulate(
             crash.tree, crash.joints, crash.ellipsoids, crash.zones, crash.car_motion, settings,
             crash.motion, empty_loads(n), empty_contacts(n, zones, len(crash.ellipsoids.pairs)),
-            empty_scratch(n), work, self._record, self._frames, head_contact, summary,
+            empty_scratch(n), work, record, self._frames, head_contact, summary,
         )  # fmt: skip
         return outcome.Raw(
             crash=crash,
             dive_angle=values["dive_angle"],
-            record=self._record[: int(summary[S_RECORDS])],
+            record=record[: int(summary[S_RECORDS])],
             frames=self._frames[: int(summary[S_FRAMES])],
             work=work,
             head_contact=head_contact,

@@ -113,10 +113,9 @@ class Settings(NamedTuple):
     trunk: int
 
 
-def stable_ticks(tree: Tree, joints: Joints, tick: float, wanted: int) -> int:
-    """Return how many ticks, at most ``wanted``, a step may take with the damping of the joints.
+def damping_rate(tree: Tree, joints: Joints) -> float:
+    """Return the largest damping rate (1/s) of a segment.
 
-    The integrator is stable while a damping rate stays below 1 / step; half of that is allowed.
     A segment's rate is the damping of its joints over its inertia, to which its children's masses
     add about the transverse axes.
     """
@@ -136,8 +135,16 @@ def stable_ticks(tree: Tree, joints: Joints, tick: float, wanted: int) -> int:
         inertia[parent, :2] += tree.mass[i] * float(
             tree.joint_in_parent[i] @ tree.joint_in_parent[i]
         )
-    rate = float((total / inertia)[1:].max())
-    return min(wanted, max(1, int(0.5 / (rate * tick))))
+    return float((total / inertia)[1:].max())
+
+
+STABLE = 0.5
+"""Largest damping rate times step; the integrator is stable below 1."""
+
+
+def stable_ticks(rate: float, tick: float, wanted: int) -> int:
+    """Return how many ticks, one to ``wanted``, a step may take with a damping rate (1/s)."""
+    return min(wanted, max(1, int(STABLE / (rate * tick))))
 
 
 @inlined_kernel

@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -171,9 +172,26 @@ def build_zones(
         inner=np.array([z.inner for z in zones]),
         half_width=np.array([z.half_width for z in zones]),
         curvature=np.array([z.curvature for z in zones]),
+        bend=np.array([_widest(zones, z) for z in zones]),
+        partner=np.array([_partner(zones, z) for z in zones], dtype=np.int64),
         box=box,
         friction=friction,
     )
+
+
+def _partner(zones: Sequence[Zone], zone: Zone) -> int:
+    """Return the row of the zone beside a zone in the same surface, or -1."""
+    for j, other in enumerate(zones):
+        same = np.array_equal(other.origin, zone.origin)
+        if same and (other.inner == zone.half_width or zone.inner == other.half_width):
+            return j
+    return -1
+
+
+def _widest(zones: Sequence[Zone], zone: Zone) -> float:
+    """Return the half width (m) of a zone and the one beside it."""
+    partner = _partner(zones, zone)
+    return zone.half_width if partner < 0 else max(zone.half_width, zones[partner].half_width)
 
 
 def static_point(vehicle: Vehicle, dive_angle: float, point: Array) -> Array:

@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 
 FILE = "q3_child_dummy_head_impact.csv"
 COLUMNS = ("test_speed_m_s", "time_ms", "head_acc_g", "impact_force_N")
+FEWEST_SAMPLES = 20
+"""Samples of one impact, at least."""
 ROBOT = 133.0
 """kg [found]."""
 KEYS = (
@@ -66,7 +68,20 @@ def validate(workers: int, measured: Path) -> Part:
         empty: list[Check] = [check(key, np.nan) for key in KEYS]
         missing = f"Not run: {FILE} is not in the folder of measured data (option --measured)."
         return Part("Child-dummy head impacts", (missing,), empty)
-    impacts = _read(path)
+    try:
+        return _judge(_read(path))
+    except ValueError as error:
+        raise UserError(f"{path}: {error}") from None
+
+
+def _judge(impacts: list[_Impact]) -> Part:
+    """Return the part for the impacts that were measured.
+
+    Raises
+    ------
+    ValueError
+        If they are no impacts that can be evaluated.
+    """
     slow, fast = impacts[:-1], impacts[-1]
     masses = [effective_mass(i.time, i.force, i.acceleration) for i in impacts]
     mass = float(np.mean(masses[:-1]))
@@ -132,6 +147,10 @@ def _read(path: Path) -> list[_Impact]:
     for part in groups:
         speed, ms, acceleration, force = part.to_numpy().T
         t = 1e-3 * ms
+        if t.size < FEWEST_SAMPLES or np.any(np.diff(t) <= 0.0):
+            raise ValueError(f"time must rise, over {FEWEST_SAMPLES} samples or more")
+        if not (force.max() > 0.0 and acceleration.max() > 0.0 and acceleration.min() >= 0.0):
+            raise ValueError("force and acceleration must be positive somewhere")
         head = STANDARD_GRAVITY * cumulative_trapezoid(acceleration, t, initial=0)
         # The robot loses what the force takes from it.
         robot = speed - cumulative_trapezoid(force, t, initial=0) / ROBOT

@@ -261,6 +261,8 @@ def one_zone(kind: int, slope: float) -> Zones:
         length=np.array([0.0 if kind == ROLL else 2.0]),
         arc=np.array([[-math.pi - 1.0, math.pi + 1.0]]),
         inner=np.zeros(1),
+        bend=np.array([2.0]),
+        partner=np.array([-1], dtype=np.int64),
         half_width=np.array([2.0]),
         curvature=np.array([0.0]),
         box=np.array([[-9.0, 9.0, -9.0, 9.0]]),

@@ -309,11 +309,6 @@ def test_bad_tests_are_refused(body: Body) -> None:
         swing_neck(body, joints, "flexion", SPEED, ramp(0.03, 4.0))
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="the first step's loss counts half: a pulse that starts at time 0 leaves the pendulum "
-    "half a step's deceleration too fast for good (neck_pendulum.py, rates)",
-)
 @pytest.mark.parametrize("stop", [STEP, 1e-3])
 def test_the_pendulum_comes_to_rest_when_the_pulse_starts_at_once(body: Body, stop: float) -> None:
     pulse = ramp(stop, start=0.0)
@@ -323,10 +318,6 @@ def test_the_pendulum_comes_to_rest_when_the_pulse_starts_at_once(body: Body, st
     np.testing.assert_allclose(test.angle[: at.size], expected[4] - expected[0], atol=1e-3)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="what the first row of a pulse has already lost is never taken from the pendulum",
-)
 @pytest.mark.parametrize("lost", [1.0, SPEED])
 def test_a_pulse_that_begins_with_a_loss_is_refused(body: Body, lost: float) -> None:
     with pytest.raises(ValueError, match="pulse"):

@@ -10,15 +10,16 @@ Item = TypeVar("Item")
 
 
 def follow(
-    items: Sequence[Item], what: str, *, quiet: bool = False, stream: TextIO = sys.stderr
+    items: Sequence[Item], what: str, *, quiet: bool = False, stream: TextIO | None = None
 ) -> Iterator[Item]:
     """Yield the items and show on a terminal how many are done.
 
     Parameters
     ----------
     items : sequence. what : word for the line, e.g. ``tests``.
-    quiet : print nothing at all. stream : where to.
+    quiet : print nothing at all. stream : where to, by default standard error.
     """
+    stream = stream or sys.stderr
     live = not quiet and stream.isatty()
     for done, item in enumerate(items):
         if live:
@@ -40,7 +41,7 @@ class Progress:
         Print nothing at all. Without a terminal nothing is printed either way.
     complete : frozenset of str
         Statuses that do not count as failed.
-    stream : TextIO
+    stream : TextIO, by default standard error
     """
 
     def __init__(
@@ -48,10 +49,10 @@ class Progress:
         *,
         quiet: bool = False,
         complete: frozenset[str] = frozenset({"ok"}),
-        stream: TextIO = sys.stderr,
+        stream: TextIO | None = None,
     ) -> None:
-        self._stream = stream
-        self._live = not quiet and stream.isatty()
+        self._stream = stream or sys.stderr
+        self._live = not quiet and self._stream.isatty()
         self._complete = complete
         self._counts: Counter[str] = Counter()
         self._total = self._done = self._first = 0

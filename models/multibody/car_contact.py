@@ -27,7 +27,9 @@ ARC_BORDER = 0.15
 ENTRY_DEPTH = 0.03
 """Depth (m) within which a segment must first be seen by a zone; deeper, it came past the border
 (beside the fender, from under the bumper) and is not in contact (assumed, ten times the way of a
-step), unless the zone beside in the same surface hands it over."""
+step), unless a zone that shares a border hands it over."""
+HANDED_DEEPER = 0.005
+"""Depth (m) by which a segment handed over may be deeper than it was before (assumed)."""
 
 
 @inlined_kernel
@@ -141,10 +143,6 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
             for j in range(count):
                 contacts.engaged[i, j] = False
             continue
-        # Whether a zone with one beside it held the segment at the last step.
-        handed = False
-        for j in range(count):
-            handed = handed or (zones.partner[j] >= 0 and contacts.engaged[i, j])
         for j in range(count):
             engaged = contacts.engaged[i, j]
             contacts.engaged[i, j] = False
@@ -161,9 +159,14 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
             if separation >= 0.0 or weight == 0.0:
                 continue
             penetration = -separation
-            seen = engaged or (handed and zones.partner[j] >= 0)
-            if not seen and penetration > ENTRY_DEPTH:
-                continue
+            if not engaged and penetration > ENTRY_DEPTH:
+                # A dent that slides across a border is as deep on its other side.
+                deepest = 0.0
+                for k in range(count):
+                    if zones.joined[j, k] and contacts.engaged[i, k]:
+                        deepest = max(deepest, contacts.largest[i, k])
+                if penetration > deepest + HANDED_DEEPER:
+                    continue
             contacts.engaged[i, j] = True
             if penetration > contacts.largest[i, j]:
                 contacts.largest[i, j] = penetration

@@ -173,25 +173,43 @@ def build_zones(
         half_width=np.array([z.half_width for z in zones]),
         curvature=np.array([z.curvature for z in zones]),
         bend=np.array([_widest(zones, z) for z in zones]),
-        partner=np.array([_partner(zones, z) for z in zones], dtype=np.int64),
+        joined=_joined(zones),
         box=box,
         friction=friction,
     )
 
 
-def _partner(zones: Sequence[Zone], zone: Zone) -> int:
-    """Return the row of the zone beside a zone in the same surface, or -1."""
-    for j, other in enumerate(zones):
-        same = np.array_equal(other.origin, zone.origin)
-        if same and (other.inner == zone.half_width or zone.inner == other.half_width):
-            return j
-    return -1
+GAP = 0.05
+"""m between the ends of two zones up to which they are joined (assumed)."""
+
+
+def _beside(zone: Zone, other: Zone) -> bool:
+    """Return whether two zones lie side by side in one surface."""
+    same = np.array_equal(other.origin, zone.origin)
+    return same and (other.inner == zone.half_width or zone.inner == other.half_width)
+
+
+def _ends(zone: Zone) -> Array:
+    """Return the (2, 2) lower and upper end (x, z) of a zone in side view."""
+    if zone.kind == ROLL:
+        ring = np.stack([np.cos(zone.arc), np.sin(zone.arc)], axis=1)
+        return np.asarray(zone.origin + zone.radius * ring)
+    return np.array([zone.origin, zone.origin + zone.length * zone.direction])
+
+
+def _joined(zones: Sequence[Zone]) -> NDArray[np.bool_]:
+    """Return the (z, z) table of zones that lie side by side or end to end."""
+    table = np.zeros((len(zones), len(zones)), dtype=np.bool_)
+    for i, zone in enumerate(zones):
+        for j, other in enumerate(zones):
+            apart = np.linalg.norm(_ends(zone)[:, None] - _ends(other)[None], axis=2).min()
+            table[i, j] = i != j and (_beside(zone, other) or apart <= GAP)
+    return table
 
 
 def _widest(zones: Sequence[Zone], zone: Zone) -> float:
-    """Return the half width (m) of a zone and the one beside it."""
-    partner = _partner(zones, zone)
-    return zone.half_width if partner < 0 else max(zone.half_width, zones[partner].half_width)
+    """Return the half width (m) of a zone and those beside it."""
+    return max([zone.half_width, *(z.half_width for z in zones if _beside(zone, z))])
 
 
 def static_point(vehicle: Vehicle, dive_angle: float, point: Array) -> Array:

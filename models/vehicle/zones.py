@@ -34,8 +34,8 @@ class Zones(NamedTuple):
     inner, half_width : (z,) m, the zone's borders left and right of the centre line; a zone with
         ``inner`` above 0 (a fender's side) is a pair of strips.
     curvature : (z,) 1/m seen from above. bend : (z,) m, how far out the zone keeps bending.
-    partner : (z,) row of the zone beside this one in the same surface, -1 if there is none: what
-        slides from one to the other stays in contact however deep it is.
+    joined : (z, z) whether two zones share a border: what slides from one to the other stays in
+        contact.
     box : (z, 4) m, lowest and highest x, lowest and highest z that a contact point can have.
     friction : (z + 1,) against the body; the last one is the road's.
     """
@@ -50,6 +50,6 @@ class Zones(NamedTuple):
     half_width: Array
     curvature: Array
     bend: Array
-    partner: Index
+    joined: NDArray[np.bool_]
     box: Array
     friction: Array

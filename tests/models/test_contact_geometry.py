@@ -262,7 +262,7 @@ def one_zone(kind: int, slope: float) -> Zones:
         arc=np.array([[-math.pi - 1.0, math.pi + 1.0]]),
         inner=np.zeros(1),
         bend=np.array([2.0]),
-        partner=np.array([-1], dtype=np.int64),
+        joined=np.zeros((1, 1), dtype=np.bool_),
         half_width=np.array([2.0]),
         curvature=np.array([0.0]),
         box=np.array([[-9.0, 9.0, -9.0, 9.0]]),

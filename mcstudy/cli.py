@@ -77,9 +77,9 @@ def reconstruct(study: Study, out: Out = None, quiet: Quiet = False, as_json: Js
 def report(folder: Folder, quiet: Quiet = False, as_json: Json = False) -> None:
     """Rebuild analysis, figures and report of a results folder without running the model."""
     from mcstudy.results import ResultsFolder
-    from studies import monte_carlo
+    from studies import api
 
-    analysis = monte_carlo.build_report(ResultsFolder(folder))
+    analysis = api.build_report(ResultsFolder(folder))
     _print_analysis(analysis, folder, quiet=quiet, as_json=as_json)
 
 
@@ -199,6 +199,14 @@ def _print_analysis(analysis: dict[str, Any], path: Path, *, quiet: bool, as_jso
     from mcstudy.text import interval, number
 
     console = Console()
+    if "factors" in analysis:
+        from studies import sobol_report
+
+        for name in analysis["convergence"]:
+            console.print(sobol_report.sentence(name, analysis["outputs"][name]), markup=False)
+        console.print(f"{analysis['runs']} runs, {analysis['base_points']} base points")
+        console.print(f"report: {path / 'report.html'}", soft_wrap=True)
+        return
     table = RichTable("output", "unit", "mean (95 % interval)", "5 %", "median", "95 %")
     for name in analysis["convergence"]:
         entry = analysis["outputs"][name]

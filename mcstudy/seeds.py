@@ -7,6 +7,8 @@ import numpy as np
 
 DESIGN = 0
 BOOTSTRAP = 1
+SALTELLI = 2
+PERMUTATION = 3
 
 
 def generator(seed: int, stream: int, index: int = 0) -> np.random.Generator:

@@ -9,13 +9,17 @@ Examples
 """
 
 from pathlib import Path
+from typing import Any
 
-from mcstudy.config import MonteCarloStudy, Reconstruction, Study, load_study
+from mcstudy.config import MonteCarloStudy, Reconstruction, SobolStudy, Study, load_study
 from mcstudy.errors import UserError
 from mcstudy.results import ResultsFolder
 from models.protocol import Run
-from studies.monte_carlo import load_study_model, run_monte_carlo
+from studies import monte_carlo, sobol
+from studies.execution import load_study_model
+from studies.monte_carlo import run_monte_carlo
 from studies.reconstruction import Comparison, reconstruct, write_reconstruction
+from studies.sobol import run_sobol
 
 
 def results_folder(study: Study, out: Path | str | None = None) -> ResultsFolder:
@@ -30,7 +34,7 @@ def run_study(
     workers: int = -1,
     quiet: bool = True,
 ) -> ResultsFolder:
-    """Run a Monte Carlo study file, or go on with it where it stopped.
+    """Run a Monte Carlo or Sobol' study file, or go on with it where it stopped.
 
     Parameters
     ----------
@@ -52,12 +56,29 @@ def run_study(
         If too many runs failed.
     """
     study = load_study(path)
-    if not isinstance(study, MonteCarloStudy):
-        raise UserError(f"{path}: kind {study.kind!r} is run by 'mcstudy reconstruct'")
     folder = results_folder(study, out)
     text = Path(path).read_text(encoding="utf-8")
-    run_monte_carlo(study, text, folder, workers=workers, quiet=quiet)
+    if isinstance(study, MonteCarloStudy):
+        run_monte_carlo(study, text, folder, workers=workers, quiet=quiet)
+    elif isinstance(study, SobolStudy):
+        run_sobol(study, text, folder, workers=workers, quiet=quiet)
+    else:
+        raise UserError(f"{path}: kind {study.kind!r} is run by 'mcstudy reconstruct'")
     return folder
+
+
+def build_report(folder: ResultsFolder) -> dict[str, Any]:
+    """Rebuild analysis, figures and report of a results folder, without running the model.
+
+    Raises
+    ------
+    UserError
+        If the folder holds no study that has a report of its own.
+    """
+    study = load_study(folder.path / "study.toml")
+    if isinstance(study, SobolStudy):
+        return sobol.build_report(folder)
+    return monte_carlo.build_report(folder)
 
 
 def run_case(

@@ -1,43 +1,20 @@
 """The Monte Carlo study: sample the inputs, run the model, describe what comes out."""
 
-import os
-import platform
-import time
 from collections.abc import Mapping
-from importlib.metadata import version
 from typing import Any
 
-import joblib
 import numpy as np
 import pandas as pd
 
-from mcstudy import config, runner, statistics, units
+from mcstudy import config, statistics, units
 from mcstudy.config import MonteCarloStudy, load_study
 from mcstudy.errors import UserError
 from mcstudy.figures import distributions, relations, style
-from mcstudy.progress import Progress
 from mcstudy.report import render
-from mcstudy.results import ResultsFolder, check_failures, digest
+from mcstudy.results import ResultsFolder
 from models.protocol import Model, complete_status
-from models.registry import load_model
-from studies import evaluation
+from studies.execution import load_study_model, run_rows
 from studies.monte_carlo_report import sections_of
-
-PACKAGES = ("numpy", "scipy", "numba", "pandas", "joblib", "pyarrow")
-
-
-def load_study_model(study: config.Study) -> Model:
-    """Return the model of a study.
-
-    Raises
-    ------
-    UserError
-        If the model or an option is unknown.
-    """
-    try:
-        return load_model(study.model.name, study.model.options)
-    except (ValueError, TypeError) as error:
-        raise UserError(f"model: {error}") from None
 
 
 def run_monte_carlo(
@@ -77,41 +54,15 @@ def run_monte_carlo(
     config.report_outputs(study, model)
     marks_of(study, model)
     columns = config.sample_inputs(study, model)
-    topics = config.numbers_digest(study, model)
-    folder.check_same_study(topics)
-    rows = np.stack([columns[item.name] for item in model.inputs], axis=1)
-    task = runner.Task(
-        evaluate=evaluation.evaluate,
-        argument={
-            "name": study.model.name,
-            "options": study.model.options,
-            "version": model.version,
-        },
-        inputs=rows,
-        input_names=[item.name for item in model.inputs],
-        output_names=[item.name for item in model.outputs],
-        replicate=np.arange(study.design.n) // study.design.size,
-    )
-    complete = complete_status(model)
+    folder.check_same_study(config.numbers_digest(study, model))
+    size = study.design.size
     with folder.open_for_writing():
         folder.write_text("study.toml", text)
-        manifest = _manifest(study, model, topics, workers)
-        if not (folder.path / "manifest.json").exists():
-            folder.write_json("manifest.json", manifest)
-        start = time.perf_counter()
-        with joblib.parallel_config(backend="loky", n_jobs=workers):
-            runs = runner.run(task, folder, Progress(quiet=quiet, complete=complete))
-        # A study that was larger before keeps its further runs.
-        folder.compact(held if (held := folder.done()) is not None else runs)
-        counts = {str(k): int(v) for k, v in runs["status"].value_counts().items()}
-        manifest |= {
-            "wall_time_s": round(time.perf_counter() - start, 3),
-            "counts": counts,
-            "digest": digest(runs),
-            "finished": True,
-        }
-        folder.write_json("manifest.json", manifest)
-        check_failures(counts, set(counts) - complete, study.max_failure_rate)
+        runs = run_rows(
+            study, model, columns, folder,
+            design={"method": study.design.method, "n": study.design.n, "replicate_size": size},
+            replicate=np.arange(study.design.n) // size, workers=workers, quiet=quiet,
+        )  # fmt: skip
         _keep_histories(study, model, runs, folder)
         return build_report(folder)
 
@@ -260,25 +211,3 @@ def _keep_histories(
         row = runs.iloc[k]
         run = model.run({name: float(row[name]) for name in names})
         folder.add_histories(int(row["run"]), run.histories)
-
-
-def _manifest(
-    study: MonteCarloStudy, model: Model, topics: Mapping[str, str], workers: int
-) -> dict[str, Any]:
-    return {
-        "format": "mcstudy-results/1",
-        "study": study.name,
-        "kind": study.kind,
-        "seed": study.seed,
-        "model": {"name": model.name, "version": model.version, "options": study.model.options},
-        "design": {"method": study.design.method, "n": study.design.n,
-                   "replicate_size": study.design.size},
-        "numbers": dict(topics),
-        "hash": config.hash_of(dict(topics)),
-        "versions": {"mcstudy": version("mcstudy"), "python": platform.python_version()}
-        | {name: version(name) for name in PACKAGES},
-        "machine": {"system": platform.system(), "processor": platform.machine(),
-                    "cores": os.cpu_count()},
-        "workers": workers,
-        "finished": False,
-    }  # fmt: skip

@@ -45,8 +45,7 @@ def main() -> None:
     rows = []
     for k, speed in enumerate(SPEEDS):
         curve = corridor.curve(float(rng.beta(4.0, 4.0)))
-        knots = np.stack([curve.penetration, curve.force], axis=1).tolist()
-        model = load_model("headform", {"hood_curve": knots, "channel_class": 0.0})
+        model = load_model("headform", {"hood_curve": curve.knots, "channel_class": 0.0})
         true_speed = speed + SPEED_SD * float(rng.standard_normal())
         run = model.run({"impact_speed": true_speed, "hood_unloading_ratio": 7.0})
         head = run.histories["head"]

@@ -104,7 +104,7 @@ def _fit_test(data: Measured, row: int, name: str, knots: int) -> FittedTest:
     curve = fit.curve
     model = load_model(
         "headform",
-        {"hood_curve": np.stack([curve.penetration, curve.force], axis=1).tolist(),
+        {"hood_curve": curve.knots,
          "channel_class": header.channel_class or CHANNEL_CLASS},
     )  # fmt: skip
     run = model.run(
@@ -149,8 +149,7 @@ def hic_corridor(corridor: Corridor, speed: float, mass: float) -> Array:
     values = []
     for coordinate in COORDINATES:
         curve = corridor.curve(float(coordinate))
-        knots = np.stack([curve.penetration, curve.force], axis=1).tolist()
-        run = load_model("headform", {"hood_curve": knots}).run(
+        run = load_model("headform", {"hood_curve": curve.knots}).run(
             {"impact_speed": speed, "headform_mass": mass,
              "hood_unloading_ratio": curve.unloading_ratio, "hood_damping": curve.damping}
         )  # fmt: skip

@@ -57,6 +57,12 @@ class ForceCurve:
         if not (self.unloading_ratio > 1.0 and self.damping >= 0.0):
             raise ValueError("unloading_ratio must exceed 1 and damping must not be negative")
 
+    @property
+    def knots(self) -> list[list[float]]:
+        """Knots as data files and model options hold them: pairs of penetration and force."""
+        pairs: list[list[float]] = np.stack([self.penetration, self.force], axis=1).tolist()
+        return pairs
+
     def scaled(self, force: float = 1.0, penetration: float = 1.0) -> "ForceCurve":
         """Return the curve with forces and penetrations multiplied by the given factors."""
         return ForceCurve(

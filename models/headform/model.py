@@ -21,7 +21,7 @@ from models.contact.law import (
 )
 from models.criteria import clip_level, filter_cfc, head_injury_criterion
 from models.criteria.units import STANDARD_GRAVITY
-from models.declaration import named_rows, read_inputs, read_outputs
+from models.declaration import read_inputs, read_outputs, run_rows
 from models.headform.impact import (
     COLUMNS,
     DEEPEST,
@@ -217,14 +217,7 @@ class HeadformModel:
         ValueError
             If the array has another number of columns or a value outside its range.
         """
-        rows = np.asarray(rows, dtype=np.float64)
-        table = np.full((rows.shape[0], len(_OUTPUTS)), np.nan)
-        status = []
-        for k, values in enumerate(named_rows(self, rows)):
-            word, outputs = self._judge(self._strike(values))
-            status.append(word)
-            table[k] = [outputs[item.name] for item in _OUTPUTS]
-        return Batch(table, status)
+        return run_rows(self, rows, lambda values: self._judge(self._strike(values)))
 
     def hood_curve(self, values: Mapping[str, float]) -> ForceCurve:
         """Return the loading curve struck for inputs by name (all of them)."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models import data
-from models.declaration import named_rows, read_inputs, read_outputs
+from models.declaration import read_inputs, read_outputs, run_rows
 from models.multibody import outcome
 from models.multibody.setup import Crash, build_crash
 from models.multibody.simulation import (
@@ -129,24 +129,15 @@ class MultibodyModel:
         ValueError
             If the array has another number of columns or a value outside its range.
         """
-        rows = np.asarray(rows, dtype=np.float64)
-        table = np.full((rows.shape[0], len(self.outputs)), np.nan)
-        status = []
-        for k, values in enumerate(named_rows(self, rows)):
-            raw = self._simulate(values)
-            if isinstance(raw, str):
-                status.append(raw)
-                continue
-            word, outputs = self._judge(raw)
-            status.append(word)
-            table[k] = [outputs[item.name] for item in self.outputs]
-        return Batch(table, status)
+        return run_rows(self, rows, lambda values: self._judge(self._simulate(values)))
 
     def _empty(self) -> dict[str, float]:
         return dict.fromkeys((item.name for item in self.outputs), math.nan)
 
-    def _judge(self, raw: outcome.Raw) -> tuple[str, dict[str, float]]:
-        """Return the status of a run and its outputs."""
+    def _judge(self, raw: outcome.Raw | str) -> tuple[str, dict[str, float]]:
+        """Return the status of a run, or why it did not start, and its outputs."""
+        if isinstance(raw, str):
+            return raw, self._empty()
         reason = END_REASONS[int(raw.summary[S_REASON])]
         if not reason.startswith("rest"):
             return reason, self._empty()

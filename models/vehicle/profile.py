@@ -57,6 +57,16 @@ class Vehicle:
     hood_side: float
     zones: tuple[Zone, ...]
 
+    @functools.cached_property
+    def joined(self) -> NDArray[np.bool_]:
+        """The (z, z) table of zones that lie side by side or end to end."""
+        return _joined(self.zones)
+
+    @functools.cached_property
+    def bend(self) -> Array:
+        """How far out (z,) m each zone keeps bending: with those beside it."""
+        return np.array([_widest(self.zones, zone) for zone in self.zones])
+
     def zone_index(self, name: str) -> int:
         """Return the row of a zone; -1 if the car has none of that name."""
         for j, zone in enumerate(self.zones):
@@ -172,8 +182,8 @@ def build_zones(
         inner=np.array([z.inner for z in zones]),
         half_width=np.array([z.half_width for z in zones]),
         curvature=np.array([z.curvature for z in zones]),
-        bend=np.array([_widest(zones, z) for z in zones]),
-        joined=_joined(zones),
+        bend=vehicle.bend,
+        joined=vehicle.joined,
         box=box,
         friction=friction,
     )

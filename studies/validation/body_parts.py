@@ -154,7 +154,7 @@ def _head_drop(child: Body) -> float:
     curve = build_tissue(child)["head"]
     model = load_model(
         "headform",
-        {"hood_curve": np.stack([curve.penetration, curve.force], axis=1).tolist()},
+        {"hood_curve": curve.knots},
     )
     run = model.run(
         {"impact_speed": math.sqrt(2.0 * STANDARD_GRAVITY * 0.30),

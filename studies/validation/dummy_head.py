@@ -220,7 +220,7 @@ def _predict(curve: ForceCurve, mass: float, speed: float) -> _Impact:
     """Return the impact of head and robot under the law of the crash core."""
     model = load_model(
         "headform",
-        {"hood_curve": np.stack([curve.penetration, curve.force], axis=1).tolist()},
+        {"hood_curve": curve.knots},
     )
     reduced = mass * ROBOT / (mass + ROBOT)
     run = model.run(

@@ -134,8 +134,7 @@ def _drop() -> float:
 
 def _over_speed(corridor: Corridor, at: float) -> Array:
     curve = corridor.curve(at)
-    knots = np.stack([curve.penetration, curve.force], axis=1).tolist()
-    model = load_model("headform", {"hood_curve": knots})
+    model = load_model("headform", {"hood_curve": curve.knots})
     ratio = curve.unloading_ratio
     return np.array(
         [model.run({"impact_speed": float(v), "hood_unloading_ratio": ratio}).outputs["hic15"]

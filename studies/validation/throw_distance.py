@@ -1,5 +1,7 @@
 """Throw distance over speed against formulas of the accident literature."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -109,10 +111,9 @@ def _within_wood(table: pd.DataFrame) -> float:
     return float(np.mean((wood_simms(throw, 2.5) <= speed) & (speed <= wood_simms(throw, 4.5))))
 
 
-def _worst(medians: Array, relation: object) -> float:
+def _worst(medians: Array, relation: Callable[[Array], Array]) -> float:
     """Return the largest error (km/h) of a relation's speed for our medians, 30 to 60 km/h."""
     middle = (SPEEDS >= 30.0) & (SPEEDS <= 60.0)
-    assert callable(relation)
     errors = (relation(medians) - SPEEDS)[middle]
     return float(errors[np.argmax(np.abs(errors))])
 

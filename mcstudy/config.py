@@ -20,9 +20,12 @@ from mcstudy.inputs import (
     sampling_order,
 )
 from mcstudy.schema import (
+    KINDS,
     ComparisonRow,
     ComparisonTable,
+    FactorStudy,
     MonteCarloStudy,
+    MorrisStudy,
     Reconstruction,
     SampledStudy,
     SobolStudy,
@@ -33,7 +36,9 @@ from mcstudy.simulator import Simulator
 __all__ = [
     "ComparisonRow",
     "ComparisonTable",
+    "FactorStudy",
     "MonteCarloStudy",
+    "MorrisStudy",
     "Reconstruction",
     "SampledStudy",
     "SobolStudy",
@@ -79,7 +84,7 @@ def first_problem(error: ValidationError) -> str:
     problem = error.errors(include_url=False)[0]
     parts = [str(part) for part in problem["loc"]]
     # Pydantic puts the chosen kind of study and of distribution into the place; the file does not.
-    if parts and parts[0] in ("monte-carlo", "reconstruction", "sobol"):
+    if parts and parts[0] in KINDS:
         parts = parts[1:]
     if len(parts) > 2 and parts[0] == "inputs" and parts[2] in DISTRIBUTION_NAMES:
         del parts[2]
@@ -194,6 +199,20 @@ def map_inputs(study: SampledStudy, model: Simulator, uniforms: Array) -> dict[s
     return columns
 
 
+def check_independent(study: FactorStudy) -> None:
+    """Raise ``UserError`` if inputs of different factors depend on each other."""
+    member = {name: group for group, names in study.groups.items() for name in names}
+    pairs = [(a, b) for a, b, _ in study.dependence.correlations]
+    pairs += [(name, parent) for name, d in study.inputs.items() for parent in d.parents]
+    for first, second in pairs:
+        if member.get(first, first) != member.get(second, second):
+            raise UserError(
+                f"dependence: {first!r} and {second!r} depend on each other, and a {study.kind} "
+                "study exchanges one factor at a time: put both into one group, or run a "
+                "monte-carlo study and 'mcstudy sensitivity' on its folder"
+            )
+
+
 USUAL_OUTPUTS = ("hic15", "throw_distance", "wad")
 
 
@@ -240,8 +259,11 @@ def numbers_digest(study: SampledStudy, model: Simulator) -> dict[str, str]:
         topics["design.method"] = study.design.method
         topics["design.replicate_size"] = study.design.size
     else:
-        topics["design.second_order"] = study.design.second_order
         topics["groups"] = table["groups"]
+        if isinstance(study, SobolStudy):
+            topics["design.second_order"] = study.design.second_order
+        else:
+            topics["design.levels"] = study.design.levels
     topics |= {f"inputs.{name}": entry for name, entry in table["inputs"].items()}
     topics |= {f"fixed.{name}": entry for name, entry in table["fixed"].items()}
     return {key: json.dumps(value, sort_keys=True) for key, value in topics.items()}

@@ -1,7 +1,7 @@
 """What a study file may hold: one class a table, one class a kind of study."""
 
 import re
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import (
     BaseModel,
@@ -15,6 +15,7 @@ from pydantic import (
 
 from mcstudy import designs
 from mcstudy.inputs import Distribution
+from mcstudy.sensitivity.factors import DUMMY
 
 LARGEST_DESIGN = 10_000_000
 """Runs that one study may have; their table fits a machine's memory."""
@@ -147,11 +148,42 @@ class Reconstruction(CommonStudy):
     strip_times: Annotated[list[FiniteFloat], Field(min_length=1)] = [0.0, 0.02, 0.04, 0.06, 0.08]
 
 
+class FactorStudy(CommonStudy):
+    """What kinds of study have that exchange one factor, an input or a group, after the other."""
+
+    kind: str
+    inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
+    dependence: Dependence = Dependence()
+    groups: dict[str, Annotated[list[str], Field(min_length=1)]] = {}
+    max_failure_rate: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
+
+    @model_validator(mode="after")
+    def _grouped_once(self) -> "FactorStudy":
+        seen: dict[str, str] = {}
+        for group, names in self.groups.items():
+            if group in self.inputs or group == DUMMY:
+                raise ValueError(f"groups.{group}: an input has this name already")
+            for name in names:
+                if name not in self.inputs:
+                    raise ValueError(f"groups.{group}: {name!r} is not a sampled input")
+                if name in seen:
+                    raise ValueError(f"input {name!r} is in groups {seen[name]!r} and {group!r}")
+                seen[name] = group
+        return self
+
+
+class FactorReport(StudyTable):
+    """``[report]`` of such a study: outputs to rank, resamples of the intervals."""
+
+    outputs: Annotated[list[str], Field(min_length=1)] | None = None
+    resamples: Annotated[int, Field(ge=100, le=100_000)] = 1000
+
+
 class SaltelliDesign(StudyTable):
     """``[design]`` of a Sobol' study: base points, doubled until the indices are known."""
 
-    n: Annotated[int, Field(ge=2, le=2**20)] = 1024
-    start: Annotated[int, Field(ge=2, le=2**20)] = 128
+    n: Annotated[int, Field(ge=64, le=2**20)] = 1024
+    start: Annotated[int, Field(ge=64, le=2**20)] = 128
     tolerance: Annotated[FiniteFloat, Field(gt=0.0)] | None = None
     second_order: bool = False
 
@@ -164,38 +196,38 @@ class SaltelliDesign(StudyTable):
         return self
 
 
-class SobolReport(StudyTable):
-    """``[report]`` of a Sobol' study: outputs to rank, resamples of the intervals."""
-
-    outputs: Annotated[list[str], Field(min_length=1)] | None = None
-    resamples: Annotated[int, Field(ge=100, le=100_000)] = 1000
-
-
-class SobolStudy(CommonStudy):
-    """``kind = "sobol"``: how much of the variance of each output each input explains."""
+class SobolStudy(FactorStudy):
+    """``kind = "sobol"``: how much of the variance of each output each factor explains."""
 
     kind: Literal["sobol"]
     design: SaltelliDesign = SaltelliDesign()
-    inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
-    dependence: Dependence = Dependence()
-    groups: dict[str, Annotated[list[str], Field(min_length=1)]] = {}
-    max_failure_rate: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
-    report: SobolReport = SobolReport()
+    report: FactorReport = FactorReport()
+
+
+class MorrisDesign(StudyTable):
+    """``[design]`` of a Morris study: trajectories and levels of the grid."""
+
+    n: Annotated[int, Field(ge=2, le=100_000)] = 50
+    levels: Annotated[int, Field(ge=2, le=20)] = 4
 
     @model_validator(mode="after")
-    def _grouped_once(self) -> "SobolStudy":
-        seen: dict[str, str] = {}
-        for group, names in self.groups.items():
-            if group in self.inputs:
-                raise ValueError(f"group {group!r} has the name of an input")
-            for name in names:
-                if name not in self.inputs:
-                    raise ValueError(f"groups.{group}: {name!r} is not a sampled input")
-                if name in seen:
-                    raise ValueError(f"input {name!r} is in groups {seen[name]!r} and {group!r}")
-                seen[name] = group
+    def _even(self) -> "MorrisDesign":
+        if self.levels % 2:
+            raise ValueError(f"levels ({self.levels}) must be even, or the grid is biased")
         return self
 
 
-Study = MonteCarloStudy | Reconstruction | SobolStudy
-SampledStudy = MonteCarloStudy | SobolStudy
+class MorrisStudy(FactorStudy):
+    """``kind = "morris"``: which of many factors matter at all."""
+
+    kind: Literal["morris"]
+    design: MorrisDesign = MorrisDesign()
+    report: FactorReport = FactorReport()
+
+
+Study = MonteCarloStudy | Reconstruction | SobolStudy | MorrisStudy
+SampledStudy = MonteCarloStudy | SobolStudy | MorrisStudy
+KINDS: tuple[str, ...] = tuple(
+    get_args(kind.model_fields["kind"].annotation)[0] for kind in get_args(Study)
+)
+"""What ``kind`` may be."""

@@ -8,7 +8,8 @@ import numpy as np
 DESIGN = 0
 BOOTSTRAP = 1
 SALTELLI = 2
-PERMUTATION = 3
+GIVEN_DATA = 3
+MORRIS = 4
 
 
 def generator(seed: int, stream: int, index: int = 0) -> np.random.Generator:

@@ -13,15 +13,17 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mcstudy import config, runner
-from mcstudy.config import SampledStudy, Study
+from mcstudy.config import FactorStudy, SampledStudy, Study
 from mcstudy.errors import UserError
+from mcstudy.failures import locate_failures
 from mcstudy.progress import Progress
 from mcstudy.results import ResultsFolder, check_failures, digest
+from mcstudy.sensitivity.blocks import FEWEST_BLOCKS
 from models.protocol import Model, complete_status
 from models.registry import load_model
 from studies import evaluation
 
-PACKAGES = ("numpy", "scipy", "numba", "pandas", "joblib", "pyarrow")
+PACKAGES = ("numpy", "scipy", "numba", "pandas", "joblib", "pyarrow", "salib")
 
 
 def load_study_model(study: Study) -> Model:
@@ -78,8 +80,9 @@ def run_rows(
     )
     complete = complete_status(model)
     manifest = _manifest(study, model, config.numbers_digest(study, model), design, workers)
-    if not (folder.path / "manifest.json").exists():
-        folder.write_json("manifest.json", manifest)
+    spent = folder.read_json("manifest.json") if (folder.path / "manifest.json").exists() else {}
+    manifest["wall_time_s"] = spent.get("wall_time_s", 0.0)
+    folder.write_json("manifest.json", manifest)
     start = time.perf_counter()
     with joblib.parallel_config(backend="loky", n_jobs=workers):
         runs = runner.run(task, folder, Progress(quiet=quiet, complete=complete))
@@ -87,7 +90,7 @@ def run_rows(
     folder.compact(held if (held := folder.done()) is not None else runs)
     counts = {str(k): int(v) for k, v in runs["status"].value_counts().items()}
     manifest |= {
-        "wall_time_s": round(time.perf_counter() - start, 3),
+        "wall_time_s": round(manifest["wall_time_s"] + time.perf_counter() - start, 3),
         "counts": counts,
         "digest": digest(runs),
         "finished": True,
@@ -95,6 +98,54 @@ def run_rows(
     folder.write_json("manifest.json", manifest)
     check_failures(counts, set(counts) - complete, study.max_failure_rate)
     return runs
+
+
+def whole_prefix(folder: ResultsFolder, design: Mapping[str, Any]) -> pd.DataFrame:
+    """Return the first runs of a design in blocks, up to the first block with a missing run.
+
+    Parameters
+    ----------
+    folder : ResultsFolder
+    design : of its manifest, with ``n`` runs in blocks of ``block``.
+
+    Raises
+    ------
+    UserError
+        If not even the first blocks are there.
+    """
+    runs = folder.runs()
+    runs = runs[runs["run"] < int(design["n"])]
+    block = int(design["block"])
+    ids = runs["run"].to_numpy()
+    gaps = np.flatnonzero(ids != np.arange(ids.size))
+    blocks = (int(gaps[0]) if gaps.size else ids.size) // block
+    if blocks < FEWEST_BLOCKS:
+        raise UserError(f"{folder.path}: too few runs are done for a report; run the study again")
+    return runs.iloc[: blocks * block]
+
+
+def judge_runs(
+    study: FactorStudy, model: Model, runs: pd.DataFrame, block: int
+) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+    """Return what an analysis in blocks begins with, and (n,) which runs are complete.
+
+    Raises
+    ------
+    StudyError
+        If more runs failed than the study allows.
+    """
+    complete: NDArray[np.bool_] = runs["status"].isin(complete_status(model)).to_numpy(dtype=bool)
+    counts = {str(k): int(v) for k, v in runs["status"].value_counts().items()}
+    check_failures(counts, set(counts) - complete_status(model), study.max_failure_rate)
+    begun = {
+        "kind": study.kind,
+        "runs": len(runs),
+        "status": counts,
+        "groups": {name: list(names) for name, names in study.groups.items()},
+        "input_units": {item.name: item.unit for item in model.inputs},
+        "failures": locate_failures(runs[list(study.inputs)], ~complete, block),
+    }
+    return begun, complete
 
 
 def _manifest(

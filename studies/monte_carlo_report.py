@@ -51,6 +51,21 @@ def sections_of(
     ]  # fmt: skip
 
 
+def summarise(analysis: Mapping[str, Any]) -> list[Table]:
+    """Return the distributions of the reported outputs as a short table."""
+    rows = []
+    for name in analysis["convergence"]:
+        entry = analysis["outputs"][name]
+        if "mean" in entry:
+            q = entry["quantiles"]
+            rows.append(
+                [name, entry["unit"], interval(entry["mean"]),
+                 *(number(q[p]["value"]) for p in ("0.05", "0.5", "0.95"))]
+            )  # fmt: skip
+    head = ["output", "unit", "mean (95 % interval)", "5 %", "median", "95 %"]
+    return [Table("", head, rows)]
+
+
 def _title(name: str) -> str:
     words = style.words(name)
     return words[0].upper() + words[1:]

@@ -1,29 +1,32 @@
 """The report of a Sobol' study: what its indices say, in words, tables and pictures."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from mcstudy.config import SobolStudy
 from mcstudy.figures import sensitivity, style
 from mcstudy.report import Section, Table
-from mcstudy.sensitivity.saltelli import DUMMY, NUDGE
-from mcstudy.text import interval, number, unit
+from mcstudy.sensitivity.factors import DUMMY, NUDGE
+from mcstudy.sensitivity.saltelli import SCRAMBLES
+from mcstudy.text import interval, number, quantity, unit
 from models.protocol import Model
+from studies.factor_report import failure_map, failures_said, groups_said, status_table
 
 NAMED = 4
 """Factors that a sentence names, the largest."""
 
 
-def draw(analysis: Mapping[str, Any], wanted: Sequence[str]) -> dict[str, Any]:
+def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
     """Return the study's figures by file name."""
     outputs = analysis["outputs"]
-    varying = [name for name in wanted if outputs[name]["variance"]]
+    varying = [name for name in analysis["convergence"] if outputs[name]["variance"]]
+    figures: dict[str, Any] = failure_map(analysis)
     if not varying:
-        return {}
-    figures: dict[str, Any] = {
+        return figures
+    figures |= {
         "indices": sensitivity.draw_indices({name: outputs[name] for name in varying}, DUMMY),
         "heatmap": sensitivity.draw_heatmap(
-            {name: entry for name, entry in outputs.items() if entry["variance"]}
+            {name: entry for name, entry in outputs.items() if entry.get("variance")}
         ),
         "convergence": sensitivity.draw_convergence(
             {name: analysis["convergence"][name] for name in varying}
@@ -43,11 +46,7 @@ def draw(analysis: Mapping[str, Any], wanted: Sequence[str]) -> dict[str, Any]:
 
 
 def sections_of(
-    study: SobolStudy,
-    model: Model,
-    manifest: Mapping[str, Any],
-    analysis: Mapping[str, Any],
-    figures: Mapping[str, Any],
+    study: SobolStudy, model: Model, analysis: Mapping[str, Any], figures: Mapping[str, Any]
 ) -> list[Section]:
     """Return the sections of the report."""
     wanted = list(analysis["convergence"])
@@ -66,15 +65,15 @@ def sections_of(
     sections = [
         Section(
             "What drives the outputs",
-            [sentence(name, outputs[name]) for name in wanted],
+            summarise(analysis),
             [_index_table(name, outputs[name]) for name in wanted],
             one("indices", "First-order and total indices with 95 % intervals. Factors whose total "
                 "index does not pass the noise line are not distinguishable from none."),
         ),
         Section(
             "All outputs",
-            ("Total indices: the share of an output's variance that would be left if all but this "
-             "factor were known.",),
+            ["Total indices: the share of an output's variance that would be left if all but this "
+             "factor were known.", *_not_given(analysis)],
             (),
             one("heatmap", "Total index of every output by factor."),
         ),
@@ -91,25 +90,38 @@ def sections_of(
         sections.append(
             Section("Interactions of two", ("Grey: not distinguishable from zero.",), (), second)
         )
-    sections += [
+    return [
+        *sections,
+        Section(
+            "The model's noise floor",
+            (f"The dummy nudges every input by {NUDGE:g} of its range. An output that follows its "
+             "inputs does not feel that; what it does to a chaotic one, no input explains, however "
+             "well it is known.",),
+            [_noise_table(analysis)],
+        ),
         Section(
             "How sure the numbers are",
-            _honesty(study, analysis),
-            [_status_table(manifest)],
+            [_convergence_said(analysis), _intervals_said(study), *failures_said(analysis)],
+            [status_table(analysis)],
             one("convergence", "Total indices on growing parts of the design, with 95 % bands; the "
-                "largest factors."),
+                "largest factors.")
+            | one("failures", "Share of failed runs in each tenth of each input."),
         ),
-        Section("The model", (f"Model {model.name}, version {model.version}.", _groups(analysis))),
+        Section("The model", (f"Model {model.name}, version {model.version}.",
+                              groups_said(analysis))),
     ]  # fmt: skip
-    return [s for s in sections if s.paragraphs or s.figures or s.tables]
+
+
+def summarise(analysis: Mapping[str, Any]) -> list[str]:
+    """Return what drives the reported outputs, a paragraph each."""
+    return [sentence(name, analysis["outputs"][name]) for name in analysis["convergence"]]
 
 
 def sentence(name: str, entry: Mapping[str, Any]) -> str:
     """Say in words what drives an output."""
     title = style.words(name)
-    title = title[0].upper() + title[1:]
     if not entry["variance"]:
-        return f"{title} does not vary."
+        return f"{title[0].upper() + title[1:]} does not vary."
     first, total = entry["first"], entry["total"]
     noise = total[DUMMY]
     factors = [factor for factor in total if factor != DUMMY]
@@ -117,10 +129,14 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     clear = [factor for factor in order if first[factor]["low"] > 0.0]
     lines = []
     if clear:
-        named = [f"{style.words(f)} explains {_share(first[f])}" for f in clear[:NAMED]]
-        lines.append(f"{title}: of the variance {', '.join(named)} on its own.")
+        named = ", ".join(f"{style.words(f)} {_share(first[f])}" for f in clear[1:NAMED])
+        lines.append(
+            f"{style.words(clear[0])} explains {_share(first[clear[0]])} of the variance of {title}"
+            + (f", {named}." if named else ".")
+        )
     else:
-        lines.append(f"{title}: no factor explains variance on its own that is clear of zero.")
+        lines.append(f"no factor on its own explains a share of the variance of {title} that is "
+                     "clear of zero.")  # fmt: skip
     mixed = sum(first[factor]["value"] for factor in factors)
     lines.append(
         f"All factors on their own explain {100.0 * mixed:.0f} %; the rest are interactions"
@@ -138,19 +154,25 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     weak = [f for f in factors if not total[f]["low"] > noise["high"]]
     if weak:
         lines.append(
-            "Not distinguishable from none, even with interactions: "
+            "Not distinguishable from zero, even with interactions: "
             f"{', '.join(style.words(f) for f in weak)}."
         )
     lines.append(
-        f"A nudge of all inputs by {NUDGE:g} of their range changes it as if {_share(noise)} of "
-        "its variance belonged to no input."
+        f"{_share(noise)} of the variance belongs to no input: a nudge of all inputs by "
+        f"{NUDGE:g} of their range changes {title} by {_quantity(entry['noise_sd'], entry)} "
+        "(standard deviation)."
     )
-    return " ".join(lines)
+    text = " ".join(lines)
+    return text[0].upper() + text[1:]
 
 
 def _share(entry: Mapping[str, float]) -> str:
-    half = 0.5 * (entry["high"] - entry["low"])
-    return f"{100.0 * entry['value']:.0f} ± {max(1.0, 100.0 * half):.0f} %"
+    half = 100.0 * 0.5 * (entry["high"] - entry["low"])
+    return f"{100.0 * entry['value']:.0f} ± {f'{half:.0f}' if half >= 0.5 else '<1'} %"
+
+
+def _quantity(value: float, entry: Mapping[str, Any]) -> str:
+    return quantity(value, entry["unit"], 2)
 
 
 def _index_table(name: str, entry: Mapping[str, Any]) -> Table:
@@ -167,34 +189,54 @@ def _index_table(name: str, entry: Mapping[str, Any]) -> Table:
     return Table(caption, ["factor", "first order (95 %)", "total (95 %)"], rows)
 
 
-def _honesty(study: SobolStudy, analysis: Mapping[str, Any]) -> list[str]:
-    failed = analysis["failures"]
-    lines = [
-        "Intervals are 95 % normal intervals with the standard deviation of "
-        f"{study.report.resamples:,} bootstrap resamples of whole base points. They count the "
-        "sampling error only, not what the model itself gets wrong.",
-        f"{failed['runs']:,} of {analysis['runs']:,} runs failed. A base point with a failed run "
-        "is left out whole, for every output that it has no value of.",
+def _not_given(analysis: Mapping[str, Any]) -> list[str]:
+    missing = [
+        f"{style.words(name)} ({entry['base_points']:,} of {analysis['base_points']:,})"
+        for name, entry in analysis["outputs"].items()
+        if "total" not in entry
     ]
-    if failed["where"]:
-        where = ", ".join(
-            f"{style.words(name)} {'high' if rank > 0.5 else 'low'} (mean rank {rank:.2f})"
-            for name, rank in failed["where"].items()
-        )
-        lines.append(f"Failed runs lie where: {where}.")
-    return lines
+    if not missing:
+        return []
+    return [
+        "No index is given where too few base points have a value in every row (no failed run, "
+        f"and a contact that the output is about): {', '.join(missing)}."
+    ]
 
 
-def _groups(analysis: Mapping[str, Any]) -> str:
-    if not analysis["groups"]:
-        return "Every input is a factor of its own."
-    text = "; ".join(
-        f"{group}: {', '.join(style.words(name) for name in names)}"
-        for group, names in analysis["groups"].items()
+def _noise_table(analysis: Mapping[str, Any]) -> Table:
+    rows = []
+    for name, entry in analysis["outputs"].items():
+        if entry.get("variance"):
+            share = entry["total"][DUMMY]
+            rows.append(
+                [
+                    style.words(name),
+                    _quantity(entry["variance"] ** 0.5, entry),
+                    _quantity(entry["noise_sd"], entry),
+                    f"{100.0 * share['value']:.2f} %",
+                ]
+            )
+    head = ["output", "standard deviation", "of it the noise floor", "share of the variance"]
+    return Table("What no input explains, by output.", head, rows)
+
+
+def _convergence_said(analysis: Mapping[str, Any]) -> str:
+    said = (
+        f"The widest 95 % interval of a total index of the reported outputs is "
+        f"{analysis['widest']:.3f} wide, at {analysis['base_points']:,} base points."
     )
-    return f"Factors that are groups of inputs: {text}."
+    tolerance = analysis["tolerance"]
+    if tolerance is None:
+        return said
+    if analysis["widest"] <= tolerance:
+        return f"{said} The study asked for {tolerance:g}: met."
+    return f"{said} The study asked for {tolerance:g}: NOT met, the budget is spent."
 
 
-def _status_table(manifest: Mapping[str, Any]) -> Table:
-    rows = [[status, f"{count:,}"] for status, count in manifest["counts"].items()]
-    return Table("How the runs ended.", ["status", "runs"], rows)
+def _intervals_said(study: SobolStudy) -> str:
+    return (
+        f"The design is {SCRAMBLES} independent scrambles of a Sobol' sequence. Intervals are 95 % "
+        f"t intervals with the standard deviation of {study.report.resamples:,} bootstrap "
+        "resamples of whole scrambles. They count the sampling error only, not what the model "
+        "itself gets wrong."
+    )

@@ -1,9 +1,8 @@
-"""Saltelli's design: base points and copies in which one input or group is exchanged.
+"""Saltelli's design: base points and copies in which one factor is exchanged (drawn by SALib).
 
-SALib lays the design; a *dummy* input rides along. It nudges all inputs by a ten-thousandth of
-their range: an output that follows its inputs smoothly does not feel it, a chaotic one does. The
-dummy's total index is thus the share of the variance that no input explains, and the noise line of
-every ranking.
+A design is sixteen independent scrambles of one low-discrepancy sequence, taken in turn. Points of
+one scramble are not independent, and resampling them gives intervals that are far too wide; the
+scrambles are, and their spread is honest.
 """
 
 import warnings
@@ -14,15 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcstudy import seeds
+from mcstudy.sensitivity.factors import factors_of, nudged, salib_problem
 
 Array = NDArray[np.float64]
 
-DUMMY = "dummy"
-"""Name of the input that stands for none."""
-NUDGE = 1e-4
-"""By how much of its range in probability the dummy moves an input (assumed)."""
-_TURN = 0.6180339887498949
-"""Share of a turn between the nudges of two inputs (golden ratio: no two go together)."""
+SCRAMBLES = 16
+"""Independent scrambles: enough for intervals, few enough to keep their points well spread."""
 
 
 @dataclass(frozen=True)
@@ -34,17 +30,13 @@ class Saltelli:
     uniforms : (n * block, d) of the inputs, the dummy's nudge applied.
     factors : names of what is exchanged, inputs or groups, the dummy last.
     block : rows of one base point.
+    scramble : (n * block,) of each row; base point i belongs to scramble ``i % 16``.
     """
 
     uniforms: Array
     factors: tuple[str, ...]
     block: int
-
-
-def factors_of(inputs: Sequence[str], groups: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
-    """Return what is exchanged: groups at the place of their first input, single inputs, dummy."""
-    member = {name: group for group, names in groups.items() for name in names}
-    return tuple(dict.fromkeys([member.get(name, name) for name in inputs] + [DUMMY]))
+    scramble: NDArray[np.int64]
 
 
 def block_size(factors: Sequence[str], *, second_order: bool) -> int:
@@ -65,32 +57,24 @@ def draw_saltelli(
     Parameters
     ----------
     inputs : d names. groups : names of inputs by group.
-    n : base points, a power of two; the design for n is the first half of that for 2 n.
-    seed : of the scramble. second_order : whether to add the rows that second order takes.
+    n : base points, 16 times a power of two; the design for n is the first half of that for 2 n.
+    seed : of the scrambles. second_order : whether to add the rows that second order takes.
     """
     from SALib.sample import sobol
 
-    member = {name: group for group, names in groups.items() for name in names}
-    names = [*inputs, DUMMY]
-    problem = {
-        "num_vars": len(names),
-        "names": names,
-        "bounds": [[0.0, 1.0]] * len(names),
-        "groups": [member.get(name, name) for name in names],
-    }
+    factors = factors_of(inputs, groups)
+    block = block_size(factors, second_order=second_order)
+    problem = salib_problem(inputs, groups)
+    cube = np.empty((n // SCRAMBLES, SCRAMBLES, block, len(inputs) + 1))
     with warnings.catch_warnings():
         # The design starts where the sequence starts; it is scrambled.
         warnings.simplefilter("ignore")
-        rows = sobol.sample(
-            problem,
-            n,
-            calc_second_order=second_order,
-            seed=seeds.generator(seed, seeds.SALTELLI),
-        )
-    factors = factors_of(inputs, groups)
-    turns = rows[:, -1:] + _TURN * np.arange(len(inputs))
-    nudged = rows[:, :-1] + NUDGE * np.sin(2.0 * np.pi * turns)
-    # Reflected at the borders of the cube.
-    nudged = np.abs(nudged)
-    nudged = 1.0 - np.abs(1.0 - nudged)
-    return Saltelli(nudged, factors, block_size(factors, second_order=second_order))
+        for k in range(SCRAMBLES):
+            stream = seeds.generator(seed, seeds.SALTELLI, k)
+            rows = sobol.sample(
+                problem, n // SCRAMBLES, calc_second_order=second_order, seed=stream
+            )
+            cube[:, k] = rows.reshape(-1, block, len(inputs) + 1)
+    rows = cube.reshape(n * block, -1)
+    scramble = np.arange(n * block) // block % SCRAMBLES
+    return Saltelli(nudged(rows[:, :-1], rows[:, -1]), factors, block, scramble)

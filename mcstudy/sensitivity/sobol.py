@@ -10,14 +10,17 @@ Computer Physics Communications 145, 2002; Saltelli et al., Computer Physics Com
     S_ij = mean(f_BAi f_ABj - f_A f_B) / V - S_i - S_j second order (Saltelli 2002)
 
 Every estimator is a ratio of means over base points, so all bootstrap resamples of all inputs and
-outputs are one matrix product of resampling weights with the terms of the base points.
+outputs are one matrix product of resampling weights with the terms of the base points. What is
+resampled is whatever is independent: base points, or the replicates that they belong to.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 Array = NDArray[np.float64]
 
@@ -91,9 +94,10 @@ def split_blocks(outputs: Array, d: int, *, second_order: bool) -> Blocks:
 
 def estimate_indices(
     blocks: Blocks,
+    replicate: NDArray[np.int64] | None = None,
     *,
     resamples: int = 1000,
-    seed: np.random.SeedSequence | int = 0,
+    rng: np.random.Generator | None = None,
     centre: Literal["all", "base"] = "all",
 ) -> Indices:
     """Return the indices of all inputs and outputs.
@@ -101,8 +105,9 @@ def estimate_indices(
     Parameters
     ----------
     blocks : Blocks, all finite.
-    resamples : of base points, for the intervals; 0 leaves them NaN.
-    seed : of the resamples.
+    replicate : (n,) of each base point, resampled as a whole; by default each is one of its own.
+    resamples : for the intervals; 0 leaves them NaN.
+    rng : of the resamples, by default a fixed one.
     centre : where outputs are centred: at the mean of all rows (as SALib) or of A and B (as SciPy).
 
     Raises
@@ -112,7 +117,9 @@ def estimate_indices(
 
     Notes
     -----
-    An output that does not vary has indices of NaN.
+    An output that does not vary has indices of NaN. Intervals are those of Student's t with the
+    bootstrap's standard deviation, which is too small by sqrt((R - 1) / R) for R replicates
+    (B. Efron, R. Tibshirani, An Introduction to the Bootstrap, 1993, section 5.3).
     """
     arrays = [blocks.A, blocks.B, blocks.AB] + ([] if blocks.BA is None else [blocks.BA])
     if not all(np.all(np.isfinite(a)) for a in arrays):
@@ -125,36 +132,60 @@ def estimate_indices(
         mean = 0.5 * (blocks.A.mean(axis=0) + blocks.B.mean(axis=0))
     else:
         mean = np.concatenate([a.reshape(-1, m) for a in arrays]).mean(axis=0)
+    pairs = [(i, j) for i in range(d) for j in range(i + 1, d)] if blocks.BA is not None else []
+    table = _terms(blocks, mean, pairs)
+    best = _ratios(table.mean(axis=0)[None], d, m, len(pairs))
+    if replicate is None:
+        replicate = np.arange(n)
+    means, reach = _resampled(table, replicate, resamples, rng or np.random.default_rng(0))
+    spread = _ratios(means, d, m, len(pairs))
+    first, total = (_with_interval(best[k][0], spread[k], reach) for k in (0, 1))
+    second = None
+    if pairs:
+        second = np.full((3, d, d, m), np.nan)
+        found = _with_interval(best[2][0], spread[2], reach)
+        for k, (i, j) in enumerate(pairs):
+            second[:, i, j] = found[:, k]
+    return Indices(first, total, second, best[3][0], n)
+
+
+def _terms(blocks: Blocks, mean: Array, pairs: Sequence[tuple[int, int]]) -> Array:
+    """Return the terms (n, k) of every base point whose means make up all estimators."""
+    n = blocks.size
     A, B, AB = blocks.A - mean, blocks.B - mean, blocks.AB - mean
-    # Terms of every base point; all estimators are ratios of their means.
     terms = [
         A + B,
         A**2 + B**2,
         (B[:, None] * (AB - A[:, None])).reshape(n, -1),
         ((A[:, None] - AB) ** 2).reshape(n, -1),
     ]
-    pairs = [(i, j) for i in range(d) for j in range(i + 1, d)] if blocks.BA is not None else []
     if blocks.BA is not None:
         BA = blocks.BA - mean
         both = A * B
         terms += [BA[:, i] * AB[:, j] - both for i, j in pairs]
-    table = np.concatenate(terms, axis=1)
-    best = _ratios(table.mean(axis=0)[None], d, m, len(pairs))
-    spread = best
-    if resamples:
-        rng = np.random.default_rng(seed)
-        weights = np.stack(
-            [np.bincount(rng.integers(0, n, n), minlength=n) for _ in range(resamples)]
-        ) / float(n)
-        spread = _ratios(weights @ table, d, m, len(pairs))
-    first, total = (_with_interval(best[k][0], spread[k]) for k in (0, 1))
-    second = None
-    if pairs:
-        second = np.full((3, d, d, m), np.nan)
-        found = _with_interval(best[2][0], spread[2])
-        for k, (i, j) in enumerate(pairs):
-            second[:, i, j] = found[:, k]
-    return Indices(first, total, second, best[3][0], n)
+    return np.concatenate(terms, axis=1)
+
+
+def _resampled(
+    table: Array, replicate: NDArray[np.int64], resamples: int, rng: np.random.Generator
+) -> tuple[Array, float]:
+    """Return the terms' means over resampled replicates, and the reach of an interval in their sd.
+
+    Without resamples, or with one replicate, there are no means.
+    """
+    labels = np.unique(replicate, return_inverse=True)[1]
+    sizes = np.bincount(labels).astype(float)
+    count = sizes.size
+    if count < 2 or not resamples:
+        return np.empty((0, table.shape[1])), np.nan
+    sums = np.zeros((count, table.shape[1]))
+    np.add.at(sums, labels, table)
+    weights = np.stack(
+        [np.bincount(rng.integers(0, count, count), minlength=count) for _ in range(resamples)]
+    ).astype(float)
+    quantile = float(stats.t.ppf(0.5 + CONFIDENCE / 2.0, count - 1))
+    means = weights @ sums / (weights @ sizes)[:, None]
+    return means, quantile * float(np.sqrt(count / (count - 1)))
 
 
 def _ratios(means: Array, d: int, m: int, pairs: int) -> tuple[Array, Array, Array, Array]:
@@ -176,9 +207,9 @@ def _ratios(means: Array, d: int, m: int, pairs: int) -> tuple[Array, Array, Arr
     return first, total, second, variance
 
 
-def _with_interval(best: Array, spread: Array) -> Array:
-    """Return value, low and high: normal intervals with the bootstrap's standard deviation."""
+def _with_interval(best: Array, spread: Array, reach: float) -> Array:
+    """Return value, low and high at ``reach`` standard deviations of the resamples."""
     if spread.shape[0] < 2:
         return np.stack([best, np.full_like(best, np.nan), np.full_like(best, np.nan)])
-    reach = 1.959963984540054 * spread.std(axis=0, ddof=1)
-    return np.stack([best, best - reach, best + reach])
+    half = reach * spread.std(axis=0, ddof=1)
+    return np.stack([best, best - half, best + half])

@@ -9,11 +9,13 @@ import pandas as pd
 from mcstudy import config, statistics, units
 from mcstudy.config import MonteCarloStudy, load_study
 from mcstudy.errors import UserError
+from mcstudy.failures import locate_failures
 from mcstudy.figures import distributions, relations, style
 from mcstudy.report import render
 from mcstudy.results import ResultsFolder
 from models.protocol import Model, complete_status
 from studies.execution import load_study_model, run_rows
+from studies.failure_report import failure_map
 from studies.monte_carlo_report import sections_of
 
 
@@ -81,13 +83,12 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
     model = load_study_model(study)
     runs = folder.runs()
     runs = runs[runs["run"] < study.design.n]
-    manifest = folder.read_json("manifest.json")
     analysis = analyse(study, model, runs)
     folder.write_json("analysis.json", analysis)
     analysis = folder.read_json("analysis.json")
     figures = draw(study, model, runs, analysis)
     style.save(figures, folder.path / "figures")
-    sections = sections_of(study, model, runs, manifest, analysis, figures)
+    sections = sections_of(study, model, runs, analysis, figures)
     subtitle = (
         f"Monte Carlo study of {len(runs):,} runs of the {model.name} model, "
         f"{study.design.method} design, seed {study.seed}"
@@ -121,7 +122,8 @@ def marks_of(study: MonteCarloStudy, model: Model) -> dict[str, list[distributio
 
 def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[str, Any]:
     """Return every number that the report prints."""
-    complete = runs[runs["status"].isin(complete_status(model))]
+    ended = runs["status"].isin(complete_status(model)).to_numpy(dtype=bool)
+    complete = runs[ended]
     groups = None if study.design.method == "monte-carlo" else complete["replicate"].to_numpy()
     marks = marks_of(study, model)
     sampled = list(study.inputs)
@@ -129,6 +131,7 @@ def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[st
     analysis: dict[str, Any] = {
         "runs": len(runs),
         "status": {str(k): int(v) for k, v in runs["status"].value_counts().items()},
+        "failures": locate_failures(runs[sampled], ~ended),
         "outputs": {},
         "exceedance": {},
         "observed": {},
@@ -175,9 +178,10 @@ def draw(
     # An output without a value in any run has nothing to draw.
     wanted = {name: unit_of[name] for name in analysis["convergence"]}
     marks = marks_of(study, model)
+    figures = failure_map(analysis)
     if not wanted:
-        return {}
-    figures = {
+        return figures
+    figures |= {
         "distributions": distributions.draw_distributions(
             complete, wanted, marks, analysis["outputs"]
         ),

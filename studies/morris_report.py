@@ -10,8 +10,11 @@ from mcstudy.sensitivity.factors import DUMMY, NUDGE
 from mcstudy.sensitivity.morris import TAIL
 from mcstudy.text import interval, number, unit
 from models.protocol import Model
-from studies.factor_report import failure_map, failures_said, groups_said, status_table
+from studies.factor_report import groups_said
+from studies.failure_report import failure_map, failures_said, status_table
 
+NAMED = 4
+"""Factors that a sentence names, the largest."""
 CURVED = 0.5
 """Scatter of the elementary effects, as a share of their mean size, above which a factor counts as
 acting through curvature or interactions (assumed)."""
@@ -37,12 +40,12 @@ def sections_of(
             summarise(analysis),
             [_table(name, analysis["outputs"][name]) for name in analysis["ranked"]],
             {
-                f"Mean size of the elementary effects (mu*), {reach}, with 95 % intervals. Factors "
+                f"Mean size of the elementary effects (μ*), {reach}, with 95 % intervals. Factors "
                 "that do not pass the noise line are not distinguishable from none.":
                 figures["mean_effects"],
-                "Scatter of the elementary effects (sigma) over their mean size: at the bottom "
+                "Scatter of the elementary effects (σ) over their mean size: at the bottom "
                 "factors that act alike everywhere, towards the upper left those whose effect "
-                "depends on the other factors or on where they stand. Groups have no sigma.":
+                "depends on the other factors or on where they stand. Groups have no σ.":
                 figures["elementary_effects"],
             },
         ),
@@ -85,13 +88,16 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     named = ", ".join(
         f"{style.words(f)} ({number(factors[f]['value'])} ± "
         f"{number(factors[f]['value'] - factors[f]['low'], 2)}{suffix})"
-        for f in clear[:4]
+        for f in clear[:NAMED]
     )
     lines = [f"{title[0].upper() + title[1:]} is moved most by {named}."]
-    curved = [f for f in clear if (factors[f]["spread"] or 0.0) > CURVED * factors[f]["value"]]
+    curved = [
+        f for f in clear[:NAMED] if (factors[f]["spread"] or 0.0) > CURVED * factors[f]["value"]
+    ]
     if curved:
         lines.append(
-            f"Through curvature or interactions: {', '.join(style.words(f) for f in curved)}."
+            "Of these, curvature or interactions with other factors show in "
+            f"{', '.join(style.words(f) for f in curved)}."
         )
     weak = [f for f in order if f not in clear]
     if weak:
@@ -112,4 +118,4 @@ def _table(name: str, entry: Mapping[str, Any]) -> Table:
         f"{style.words(name)} [{unit(entry['unit']) or '–'}]: elementary effects over "
         f"{entry['trajectories']:,} trajectories."
     )
-    return Table(caption, ["factor", "mu* (95 %)", "mu", "sigma"], rows)
+    return Table(caption, ["factor", "μ* (95 %)", "μ", "σ"], rows)

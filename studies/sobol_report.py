@@ -8,9 +8,10 @@ from mcstudy.figures import sensitivity, style
 from mcstudy.report import Section, Table
 from mcstudy.sensitivity.factors import DUMMY, NUDGE
 from mcstudy.sensitivity.saltelli import SCRAMBLES
-from mcstudy.text import interval, number, quantity, unit
+from mcstudy.text import number, quantity, share, unit
 from models.protocol import Model
-from studies.factor_report import failure_map, failures_said, groups_said, status_table
+from studies.factor_report import groups_said
+from studies.failure_report import failure_map, failures_said, status_table
 
 NAMED = 4
 """Factors that a sentence names, the largest."""
@@ -137,9 +138,9 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     else:
         lines.append(f"no factor on its own explains a share of the variance of {title} that is "
                      "clear of zero.")  # fmt: skip
-    mixed = sum(first[factor]["value"] for factor in factors)
+    alone = min(1.0, max(0.0, sum(first[factor]["value"] for factor in factors)))
     lines.append(
-        f"All factors on their own explain {100.0 * mixed:.0f} %; the rest are interactions"
+        f"All factors on their own explain {100.0 * alone:.0f} %; the rest are interactions"
         + (" and chaos." if noise["value"] > 0.01 else ".")
     )
     strongest = sorted(factors, key=lambda f: first[f]["value"] - total[f]["value"])[:2]
@@ -162,13 +163,14 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
         f"{NUDGE:g} of their range changes {title} by {_quantity(entry['noise_sd'], entry)} "
         "(standard deviation)."
     )
-    text = " ".join(lines)
-    return text[0].upper() + text[1:]
+    return " ".join(line[0].upper() + line[1:] for line in lines)
 
 
 def _share(entry: Mapping[str, float]) -> str:
-    half = 100.0 * 0.5 * (entry["high"] - entry["low"])
-    return f"{100.0 * entry['value']:.0f} ± {f'{half:.0f}' if half >= 0.5 else '<1'} %"
+    value, half = 100.0 * entry["value"], 50.0 * (entry["high"] - entry["low"])
+    if abs(value) < 0.5 and half < 0.5:
+        return "less than 1 %"
+    return f"{value:.0f} ± {max(half, 1.0):.0f} %"
 
 
 def _quantity(value: float, entry: Mapping[str, Any]) -> str:
@@ -177,10 +179,7 @@ def _quantity(value: float, entry: Mapping[str, Any]) -> str:
 
 def _index_table(name: str, entry: Mapping[str, Any]) -> Table:
     order = sorted(entry["total"], key=lambda f: -(entry["total"][f]["value"] or 0.0))
-    rows = [
-        [style.words(f), interval(entry["first"][f], 2), interval(entry["total"][f], 2)]
-        for f in order
-    ]
+    rows = [[style.words(f), share(entry["first"][f]), share(entry["total"][f])] for f in order]
     caption = (
         f"{style.words(name)} [{unit(entry['unit']) or '–'}]: variance "
         f"{number(entry['variance'])}, {entry['base_points']:,} base points. Negative estimates "

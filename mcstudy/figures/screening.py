@@ -31,7 +31,7 @@ def draw_mean_effects(outputs: Mapping[str, Mapping[str, Any]], dummy: str) -> F
         for axes, (name, entry) in zip(row, outputs.items(), strict=True):
             table = entry["factors"]
             draw_ranking(axes, {k: v for k, v in table.items() if k != dummy}, table[dummy]["high"])
-            axes.set_xlabel(style.label("mean size of effect", entry["unit"]))
+            axes.set_xlabel(style.label("mean size of effect μ*", entry["unit"]))
             axes.set_title(style.words(name))
         handles, labels = row[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=2, fontsize=9)
@@ -71,17 +71,33 @@ def draw_elementary_effects(outputs: Mapping[str, Mapping[str, Any]]) -> Figure:
             top = 1.08 * float(max(size.max(), spread.max(), 1e-300))
             for slope, dash in ((0.1, ":"), (0.5, "--"), (1.0, "-")):
                 axes.plot([0.0, top], [0.0, slope * top], color=style.GREY, linestyle=dash,
-                          linewidth=0.9, label=f"sigma = {slope:g} mu*")  # fmt: skip
+                          linewidth=0.9, label=f"σ = {slope:g} μ*")  # fmt: skip
             axes.scatter(size, spread, s=22, color=style.BLUE, zorder=3)
-            for k in range(min(NAMED, len(order))):
-                axes.annotate(style.words(order[k]), (size[k], spread[k]), xytext=(4, 3),
-                              textcoords="offset points", fontsize=7)  # fmt: skip
-            axes.set(xlim=(0.0, 1.18 * top), ylim=(0.0, top), title=style.words(name))
-            axes.set_xlabel(style.label("mean size of effect mu*", entry["unit"]))
-            axes.set_ylabel(style.label("scatter of effect sigma", entry["unit"]))
+            named = min(NAMED, len(order))
+            heights = _spread_labels(size[:named], spread[:named], 0.4 * top, 0.05 * top)
+            for k in range(named):
+                axes.annotate(
+                    style.words(order[k]), (size[k], spread[k]), fontsize=7, va="center",
+                    xytext=(size[k] + 0.025 * top, heights[k]),
+                )  # fmt: skip
+            axes.set(xlim=(0.0, 1.3 * top), ylim=(0.0, 1.05 * top), title=style.words(name))
+            axes.set_xlabel(style.label("mean size of effect μ*", entry["unit"]))
+            axes.set_ylabel(style.label("scatter of effect σ", entry["unit"]))
         handles, labels = row[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=3, fontsize=9)
         return figure
+
+
+def _spread_labels(x: Array, y: Array, width: float, gap: float) -> Array:
+    """Return heights of labels at (x, y) moved up where they would lie on another one."""
+    placed = np.array(y)
+    order = np.argsort(y)
+    for k, index in enumerate(order):
+        for below in order[:k]:
+            near = abs(x[index] - x[below]) < width
+            if near and placed[index] < placed[below] + gap:
+                placed[index] = placed[below] + gap
+    return placed
 
 
 def draw_given_data(measures: Mapping[str, Mapping[str, Any]], titles: Mapping[str, str]) -> Figure:

@@ -142,7 +142,6 @@ def judge_runs(
         "runs": len(runs),
         "status": counts,
         "groups": {name: list(names) for name, names in study.groups.items()},
-        "input_units": {item.name: item.unit for item in model.inputs},
         "failures": locate_failures(runs[list(study.inputs)], ~complete, block),
     }
     return begun, complete

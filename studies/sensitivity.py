@@ -14,9 +14,9 @@ from mcstudy.progress import follow
 from mcstudy.report import render
 from mcstudy.results import ResultsFolder
 from mcstudy.sensitivity.given_data import measure_given_data
-from mcstudy.sensitivity.main_effects import main_effect
 from models.protocol import complete_status
 from studies.execution import load_study_model
+from studies.main_effects import main_effects_of
 from studies.sensitivity_report import draw, sections_of
 
 
@@ -68,7 +68,6 @@ def measure_sensitivity(
         "title": study.title,
         "runs": len(complete),
         "dependent": _dependent(study),
-        "input_units": {item.name: item.unit for item in model.inputs},
         "outputs": {},
         "main_effects": {},
     }
@@ -98,9 +97,7 @@ def measure_sensitivity(
         analysis["outputs"][name] = {
             "unit": unit_of[name], "runs": found.runs, "measures": measures
         }  # fmt: skip
-        analysis["main_effects"][name] = {
-            key: main_effect(values[:, k], column) for k, key in enumerate(inputs)
-        }
+        analysis["main_effects"][name] = main_effects_of(study, model, complete, name)
     folder = out or ResultsFolder(Path(source.path) / "sensitivity")
     with folder.open_for_writing():
         folder.write_json("analysis.json", analysis)

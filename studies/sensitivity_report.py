@@ -24,7 +24,6 @@ def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
         figures[f"measures_{name}"] = screening.draw_given_data(entry["measures"], TITLES)
         figures[f"main_effects_{name}"] = sensitivity.draw_main_effects(
             analysis["main_effects"][name],
-            analysis["input_units"],
             style.label(name, entry["unit"]),
         )
     return figures

@@ -12,11 +12,11 @@ from mcstudy.config import SobolStudy
 from mcstudy.errors import StudyError
 from mcstudy.sensitivity.blocks import FEWEST_BLOCKS, is_enough, outputs_alike, whole_blocks
 from mcstudy.sensitivity.factors import DUMMY, factors_of
-from mcstudy.sensitivity.main_effects import main_effect
 from mcstudy.sensitivity.saltelli import block_size
 from mcstudy.sensitivity.sobol import Indices, estimate_indices, split_blocks
 from models.protocol import Model
 from studies.execution import judge_runs
+from studies.main_effects import main_effects_of
 
 Array = NDArray[np.float64]
 
@@ -62,19 +62,15 @@ def analyse(study: SobolStudy, model: Model, runs: pd.DataFrame) -> dict[str, An
             f"{', '.join(wanted)}: too few of the {len(cube)} base points have no failed run and a "
             "value in every row; no index is given"
         )
+    # Of a block only A and B are drawn independently.
+    drawn = runs[np.isin(runs["run"] % block, (0, block - 1))]
     for name in ranked:
         column = names.index(name)
         held = kept[:, column]
         analysis["convergence"][name] = _convergence(
             study, cube[held][:, :, column : column + 1], scramble[held], factors
         )
-        # Of a block only A and B are drawn independently.
-        values = cube[:, [0, -1], column].ravel()
-        rows = runs[list(study.inputs)].to_numpy(dtype=float).reshape(len(cube), block, -1)
-        analysis["main_effects"][name] = {
-            key: main_effect(rows[:, [0, -1], k].ravel(), values)
-            for k, key in enumerate(study.inputs)
-        }
+        analysis["main_effects"][name] = main_effects_of(study, model, drawn, name)
     widths = [
         entry["high"] - entry["low"]
         for name in ranked

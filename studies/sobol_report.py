@@ -36,7 +36,6 @@ def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
     for name in varying:
         figures[f"main_effects_{name}"] = sensitivity.draw_main_effects(
             analysis["main_effects"][name],
-            analysis["input_units"],
             style.label(name, outputs[name]["unit"]),
         )
         if "second" in outputs[name]:

@@ -123,10 +123,14 @@ def draw_second_order(entry: Mapping[str, Any], factors: Sequence[str], title: s
         return figure
 
 
-def draw_main_effects(
-    effects: Mapping[str, Mapping[str, Any]], units: Mapping[str, str], ylabel: str
-) -> Figure:
-    """Return conditional mean (with its 95 % interval) and 90 % band of an output by input."""
+def draw_main_effects(effects: Mapping[str, Mapping[str, Any]], ylabel: str) -> Figure:
+    """Return conditional mean (with its 95 % interval) and 90 % band of an output by input.
+
+    Parameters
+    ----------
+    effects : ``unit``, ``x``, ``mean``, ``error``, ``low`` and ``high`` by input.
+    ylabel : of the output.
+    """
     columns = 4
     rows = -(-len(effects) // columns)
     with style.styled():
@@ -134,7 +138,7 @@ def draw_main_effects(
         grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
         for axes in grid.flat[len(effects) :]:
             axes.set_visible(False)
-        for k, (axes, (name, entry)) in enumerate(zip(grid.flat, effects.items(), strict=False)):
+        for axes, (name, entry) in zip(grid.flat, effects.items(), strict=False):
             x, mean, error, low, high = (
                 np.array(entry[key], dtype=float) for key in ("x", "mean", "error", "low", "high")
             )
@@ -143,9 +147,8 @@ def draw_main_effects(
             axes.fill_between(x, mean - 1.96 * error, mean + 1.96 * error, color=style.BLUE,
                               alpha=0.35, linewidth=0)  # fmt: skip
             axes.plot(x, mean, color=style.BLUE, label="conditional mean, 95 % interval")
-            axes.set_xlabel(style.label(name, units.get(name, "1")))
-            if k % columns == 0:
-                axes.set_ylabel(ylabel)
+            axes.set_xlabel(style.label(name, entry["unit"]))
+        figure.supylabel(ylabel, fontsize=10)
         handles, labels = grid[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=2, fontsize=9)
         return figure
@@ -158,7 +161,7 @@ MOST_LINES = 7
 def draw_convergence(convergence: Mapping[str, Sequence[Mapping[str, Any]]]) -> Figure:
     """Return total indices against the number of base points, a panel an output."""
     with style.styled():
-        figure = style.new_figure(4.3 * len(convergence), 3.8)
+        figure = style.new_figure(4.3 * len(convergence), 4.4)
         row = figure.subplots(1, len(convergence), squeeze=False)[0]
         for axes, (name, steps) in zip(row, convergence.items(), strict=True):
             last = steps[-1]["total"]
@@ -177,6 +180,6 @@ def draw_convergence(convergence: Mapping[str, Sequence[Mapping[str, Any]]]) -> 
             axes.set_xticks(n, [f"{v:.0f}" for v in n])
             axes.minorticks_off()
             axes.set(xlabel="base points [–]", title=style.words(name))
-            axes.legend(fontsize=7, framealpha=0.9)
+            axes.legend(fontsize=7, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.17))
         row[0].set_ylabel("total index [–]")
         return figure

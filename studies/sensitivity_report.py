@@ -6,7 +6,7 @@ from typing import Any
 from mcstudy.figures import screening, sensitivity, style
 from mcstudy.report import Section, Table
 from mcstudy.sensitivity.given_data import DUMMIES
-from mcstudy.text import interval, number
+from mcstudy.text import number, share
 
 TITLES = {
     "first_order": "first-order index, rank based [–]",
@@ -93,7 +93,7 @@ def _table(name: str, entry: Mapping[str, Any]) -> Table:
     first = measures["first_order"]["inputs"]
     order = sorted(first, key=lambda key: -(first[key]["value"] or 0.0))
     rows = [
-        [style.words(key), *(interval(table["inputs"][key], 2) for table in measures.values())]
+        [style.words(key), *(share(table["inputs"][key]) for table in measures.values())]
         for key in order
     ]
     rows.append(["noise line", *(number(table["noise"], 2) for table in measures.values())])

@@ -100,24 +100,27 @@ def draw_second_order(entry: Mapping[str, Any], factors: Sequence[str], title: s
             if i < j:
                 row = entry["second"][f"{a} x {b}"]
                 values[j, i] = row["value"]
-                distinct[j, i] = row["low"] > 0.0
+                distinct[j, i] = row["low"] > 0.0 or row["high"] < 0.0
     with style.styled():
         figure = style.new_figure(0.6 * size + 2.6, 0.42 * size + 1.6)
         axes = figure.subplots()
         labels = [style.words(name) for name in factors]
         limit = max(0.05, float(np.nanmax(np.abs(values))))
         sns.heatmap(
-            pd.DataFrame(values, index=labels, columns=labels), ax=axes, mask=np.isnan(values),
-            cmap=sns.diverging_palette(240, 30, s=85, l=50, as_cmap=True), vmin=-limit,
-            vmax=limit, annot=True, fmt=".2f", annot_kws={"fontsize": 7}, linewidths=0.5,
-            cbar_kws={"label": "second-order index [–]"},
+            pd.DataFrame(np.where(distinct, values, 0.0), index=labels, columns=labels), ax=axes,
+            mask=np.isnan(values), cmap=sns.diverging_palette(240, 30, s=85, l=50, as_cmap=True),
+            vmin=-limit, vmax=limit, linewidths=0.5, cbar_kws={"label": "second-order index [–]"},
         )  # fmt: skip
-        shown = distinct[~np.isnan(values)]
-        for text, clear in zip(axes.texts, shown, strict=True):
-            if not clear:
-                text.set_color("#A0A0A0")
+        for j, i in zip(*np.nonzero(~np.isnan(values)), strict=True):
+            axes.text(
+                i + 0.5, j + 0.5, f"{values[j, i]:.2f}", fontsize=7, ha="center", va="center",
+                color="black" if distinct[j, i] else style.GREY,
+                fontweight="bold" if distinct[j, i] else "normal",
+            )  # fmt: skip
+        axes.grid(visible=False)
         axes.set(title=title, xlabel="", ylabel="")
-        axes.tick_params(axis="x", rotation=40)
+        axes.tick_params(axis="x", rotation=40, length=0)
+        axes.tick_params(axis="y", length=0)
         for tick in axes.get_xticklabels():
             tick.set_horizontalalignment("right")
         return figure

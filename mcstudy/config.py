@@ -202,9 +202,12 @@ def map_inputs(study: SampledStudy, model: Simulator, uniforms: Array) -> dict[s
 def check_independent(study: FactorStudy) -> None:
     """Raise ``UserError`` if inputs of different factors depend on each other."""
     member = {name: group for group, names in study.groups.items() for name in names}
-    pairs = [(a, b) for a, b, _ in study.dependence.correlations]
+    pairs = [(a, b) for a, b, value in study.dependence.correlations if value != 0.0]
     pairs += [(name, parent) for name, d in study.inputs.items() for parent in d.parents]
     for first, second in pairs:
+        # What is not sampled at all is refused with the dependence itself.
+        if first not in study.inputs or second not in study.inputs:
+            continue
         if member.get(first, first) != member.get(second, second):
             raise UserError(
                 f"dependence: {first!r} and {second!r} depend on each other, and a {study.kind} "
@@ -259,7 +262,7 @@ def numbers_digest(study: SampledStudy, model: Simulator) -> dict[str, str]:
         topics["design.method"] = study.design.method
         topics["design.replicate_size"] = study.design.size
     else:
-        topics["groups"] = table["groups"]
+        topics["groups"] = {group: sorted(names) for group, names in table["groups"].items()}
         if isinstance(study, SobolStudy):
             topics["design.second_order"] = study.design.second_order
         else:

@@ -159,9 +159,14 @@ class FactorStudy(CommonStudy):
 
     @model_validator(mode="after")
     def _grouped_once(self) -> "FactorStudy":
+        for table, taken in (("inputs", [*self.inputs]), ("groups", [*self.groups])):
+            if DUMMY in taken:
+                raise ValueError(
+                    f"{table}.{DUMMY}: this name is the factor's that stands for no input"
+                )
         seen: dict[str, str] = {}
         for group, names in self.groups.items():
-            if group in self.inputs or group == DUMMY:
+            if group in self.inputs:
                 raise ValueError(f"groups.{group}: an input has this name already")
             for name in names:
                 if name not in self.inputs:
@@ -208,7 +213,7 @@ class MorrisDesign(StudyTable):
     """``[design]`` of a Morris study: trajectories and levels of the grid."""
 
     n: Annotated[int, Field(ge=2, le=100_000)] = 50
-    levels: Annotated[int, Field(ge=2, le=20)] = 4
+    levels: Annotated[int, Field(ge=4, le=20)] = 4
 
     @model_validator(mode="after")
     def _even(self) -> "MorrisDesign":

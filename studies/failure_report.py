@@ -29,9 +29,10 @@ def failures_said(analysis: Mapping[str, Any]) -> list[str]:
         )
     lines = [f"{lost}."]
     if failed["where"]:
+        words = {"low": "low", "high": "high", "ends": "low or high", "middle": "in the middle"}
         where = ", ".join(
-            f"{style.words(name)} {'high' if rank > 0.5 else 'low'} (mean rank {rank:.2f})"
-            for name, rank in failed["where"].items()
+            f"{style.words(name)} {words[entry['place']]} (mean rank {entry['mean_rank']:.2f})"
+            for name, entry in failed["where"].items()
         )
         lines.append(f"Failed runs lie where: {where}.")
     else:

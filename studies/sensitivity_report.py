@@ -21,6 +21,8 @@ def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
     """Return the figures by file name."""
     figures = {}
     for name, entry in analysis["outputs"].items():
+        if not _varies(entry):
+            continue
         figures[f"measures_{name}"] = screening.draw_given_data(entry["measures"], TITLES)
         figures[f"main_effects_{name}"] = sensitivity.draw_main_effects(
             analysis["main_effects"][name],
@@ -34,19 +36,17 @@ def sections_of(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list
     sections = []
     for name, entry in analysis["outputs"].items():
         words = style.words(name)
-        sections.append(
-            Section(
-                words[0].upper() + words[1:],
-                [sentence(name, entry)],
-                [_table(name, entry)],
-                {
-                    f"What goes with {words}: 95 % intervals for the first-order index and delta, "
-                    "smallest and largest slice for PAWN. Grey: not above the noise line.":
-                    figures[f"measures_{name}"],
-                    f"Conditional mean and band of {words}.": figures[f"main_effects_{name}"],
-                },
-            )
-        )  # fmt: skip
+        heading, said = words[0].upper() + words[1:], [sentence(name, entry)]
+        if not _varies(entry):
+            sections.append(Section(heading, said))
+            continue
+        shown = {
+            f"What goes with {words}: 95 % intervals for the first-order index, bootstrap scatter "
+            "for delta, smallest and largest slice for PAWN. Grey: not above the noise line.":
+            figures[f"measures_{name}"],
+            f"Conditional mean and band of {words}.": figures[f"main_effects_{name}"],
+        }  # fmt: skip
+        sections.append(Section(heading, said, [_table(name, entry)], shown))
     return [*sections, Section("How to read the numbers", _explained(analysis))]
 
 
@@ -57,10 +57,12 @@ def summarise(analysis: Mapping[str, Any]) -> list[str]:
 
 def sentence(name: str, entry: Mapping[str, Any]) -> str:
     """Say in words which inputs go with an output."""
-    first = entry["measures"]["first_order"]["inputs"]
-    order = sorted(first, key=lambda key: -(first[key]["value"] or 0.0))
-    clear = [key for key in order if first[key]["clear"]]
     words = style.words(name)
+    if not _varies(entry):
+        return f"{words[0].upper() + words[1:]} does not vary."
+    first = entry["measures"]["first_order"]["inputs"]
+    order = sorted(first, key=lambda key: -first[key]["value"])
+    clear = [key for key in order if first[key]["clear"]]
     if clear:
         named = ", ".join(
             f"{style.words(key)} {100.0 * first[key]['value']:.0f} ± "
@@ -86,6 +88,10 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     if none:
         text += f" Not distinguishable from none: {', '.join(map(style.words, none))}."
     return text
+
+
+def _varies(entry: Mapping[str, Any]) -> bool:
+    return entry["measures"]["first_order"]["noise"] is not None
 
 
 def _table(name: str, entry: Mapping[str, Any]) -> Table:

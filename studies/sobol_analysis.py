@@ -74,10 +74,13 @@ def analyse(study: SobolStudy, model: Model, runs: pd.DataFrame) -> dict[str, An
     widths = [
         entry["high"] - entry["low"]
         for name in ranked
+        if analysis["outputs"][name]["variance"]
         for factor, entry in analysis["outputs"][name]["total"].items()
         if factor != DUMMY
     ]
-    return analysis | {"widest": float(np.nanmax(widths)), "tolerance": study.design.tolerance}
+    # An interval that could not be estimated is not a narrow one.
+    widest = float(np.max(np.nan_to_num(widths, nan=np.inf), initial=0.0))
+    return analysis | {"widest": widest, "tolerance": study.design.tolerance}
 
 
 def _indices(

@@ -219,6 +219,8 @@ def _noise_table(analysis: Mapping[str, Any]) -> Table:
 
 
 def _convergence_said(analysis: Mapping[str, Any]) -> str:
+    if analysis["widest"] is None:
+        return "Some intervals could not be estimated: an output hardly ever changes."
     said = (
         f"The widest 95 % interval of a total index of the reported outputs is "
         f"{analysis['widest']:.3f} wide, at {analysis['base_points']:,} base points."

@@ -33,7 +33,7 @@ MEASURES: dict[str, Callable[[Array, Array, np.random.Generator], Array]] = {
 
 @dataclass(frozen=True)
 class GivenData:
-    """What the measures say of one output.
+    """What the measures say of one output; NaN where it does not vary.
 
     Attributes
     ----------
@@ -67,6 +67,9 @@ def measure_given_data(values: Array, outputs: Array, seed: int) -> GivenData:
     rng = seeds.generator(seed, seeds.GIVEN_DATA)
     x = np.column_stack([values[held], rng.random((y.size, DUMMIES))])
     d = values.shape[1]
+    if np.ptp(y) == 0.0:
+        nothing = np.full((3, d), np.nan)
+        return GivenData(dict.fromkeys(MEASURES, nothing), dict.fromkeys(MEASURES, np.nan), y.size)
     found = {name: measure(x, y, rng) for name, measure in MEASURES.items()}
     return GivenData(
         values={name: table[:, :d] for name, table in found.items()},

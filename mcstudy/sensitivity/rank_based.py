@@ -10,8 +10,9 @@ from scipy import stats
 
 Array = NDArray[np.float64]
 
-SUBSAMPLES = 100
-"""Half samples whose scatter gives the interval (assumed)."""
+PARTS, PARTITIONS = 5, 20
+"""Disjoint parts of the sample whose scatter gives the interval, and how often they are drawn anew
+(assumed)."""
 
 
 def rank_first_order(values: Array, outputs: Array, rng: np.random.Generator) -> Array:
@@ -19,22 +20,22 @@ def rank_first_order(values: Array, outputs: Array, rng: np.random.Generator) ->
 
     Parameters
     ----------
-    values : (n, d). outputs : (n,), finite. rng : of the half samples.
+    values : (n, d). outputs : (n,), finite. rng : of the parts.
     """
     found = _estimate(values, outputs)
-    half = outputs.size // 2
-    parts = [rng.permutation(outputs.size)[:half] for _ in range(SUBSAMPLES)]
-    halves = np.stack([_estimate(values[part], outputs[part]) for part in parts])
-    # A half sample scatters about the whole one as much as the whole one about the truth.
-    error = np.sqrt(np.mean((halves - found) ** 2, axis=0))
-    reach = float(stats.norm.ppf(0.975)) * error
+    variances = []
+    for _ in range(PARTITIONS):
+        parts = np.array_split(rng.permutation(outputs.size), PARTS)
+        estimates = np.stack([_estimate(values[part], outputs[part]) for part in parts])
+        variances.append(estimates.var(axis=0, ddof=1) / PARTS)
+    reach = float(stats.norm.ppf(0.975)) * np.sqrt(np.mean(variances, axis=0))
     return np.stack([found, found - reach, found + reach])
 
 
 def _estimate(values: Array, outputs: Array) -> Array:
+    if np.ptp(outputs) == 0.0:
+        return np.full(values.shape[1], np.nan)
     centred = outputs - outputs.mean()
     variance = float(centred @ centred)
-    if variance == 0.0:
-        return np.full(values.shape[1], np.nan)
     ordered = centred[np.argsort(values, axis=0, kind="stable")]
     return np.asarray((ordered * np.roll(ordered, -1, axis=0)).sum(axis=0) / variance)

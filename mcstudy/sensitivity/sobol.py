@@ -195,6 +195,7 @@ def _ratios(means: Array, d: int, m: int, pairs: int) -> tuple[Array, Array, Arr
     total_sum, squares, crossed, gaps, products = np.split(means, cuts, axis=1)
     variance = 0.5 * squares - (0.5 * total_sum) ** 2
     varies = variance > np.finfo(float).eps * np.maximum(squares, np.finfo(float).tiny)
+    variance = np.where(varies, variance, 0.0)
     over = np.where(varies, variance, np.nan)
     first = crossed.reshape(r, d, m) / over[:, None]
     total = 0.5 * gaps.reshape(r, d, m) / over[:, None]

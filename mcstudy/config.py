@@ -252,7 +252,6 @@ def numbers_digest(study: SampledStudy, model: Simulator) -> dict[str, str]:
     """
     table = study.model_dump(mode="json")
     topics = {
-        "kind": study.kind,
         "model": [table["model"], model.version],
         "seed": table["seed"],
         "dependence": table["dependence"],

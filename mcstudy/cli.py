@@ -178,12 +178,15 @@ def status(folder: Folder, as_json: Json = False) -> None:
 
     results = ResultsFolder(folder)
     manifest = results.read_json("manifest.json")
+    total = int(manifest["design"]["n"])
     runs = results.done()
+    if runs is not None:
+        # A folder may hold runs of an earlier, larger design.
+        runs = runs[runs["run"] < total]
     done = 0 if runs is None else len(runs)
     counts = (
         {} if runs is None else {str(k): int(v) for k, v in runs["status"].value_counts().items()}
     )
-    total = int(manifest["design"]["n"])
     if as_json:
         _print_json({"done": done, "total": total, "counts": counts})
         return

@@ -261,6 +261,7 @@ def numbers_digest(study: SampledStudy, model: Simulator) -> dict[str, str]:
         topics["design.method"] = study.design.method
         topics["design.replicate_size"] = study.design.size
     else:
+        topics["kind"] = study.kind
         topics["groups"] = {group: sorted(names) for group, names in table["groups"].items()}
         if isinstance(study, SobolStudy):
             topics["design.second_order"] = study.design.second_order

@@ -15,6 +15,7 @@ from pydantic import (
 
 from mcstudy import designs
 from mcstudy.inputs import Distribution
+from mcstudy.sensitivity.blocks import FEWEST_BLOCKS
 from mcstudy.sensitivity.factors import DUMMY
 
 LARGEST_DESIGN = 10_000_000
@@ -212,7 +213,7 @@ class SobolStudy(FactorStudy):
 class MorrisDesign(StudyTable):
     """``[design]`` of a Morris study: trajectories and levels of the grid."""
 
-    n: Annotated[int, Field(ge=2, le=100_000)] = 50
+    n: Annotated[int, Field(ge=FEWEST_BLOCKS, le=100_000)] = 50
     levels: Annotated[int, Field(ge=4, le=20)] = 4
 
     @model_validator(mode="after")

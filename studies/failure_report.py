@@ -7,6 +7,9 @@ from mcstudy.figures import style
 from mcstudy.figures.failures import draw_failures
 from mcstudy.report import Table
 
+BLOCKS = {"sobol": "base points", "morris": "trajectories"}
+"""What runs that belong together are called, by kind of study."""
+
 
 def failure_map(analysis: Mapping[str, Any]) -> dict[str, Any]:
     """Return the figure of where runs failed, if any did."""
@@ -22,11 +25,8 @@ def failures_said(analysis: Mapping[str, Any]) -> list[str]:
     lost = (
         f"{failed['runs']:,} of {analysis['runs']:,} runs failed ({100.0 * failed['share']:.2g} %)"
     )
-    if "factors" in analysis:
-        lost += (
-            f", in {failed['blocks']:,} blocks of runs that belong together. A block with a failed "
-            "run is left out whole"
-        )
+    if analysis["kind"] in BLOCKS:
+        lost += f", in {failed['blocks']:,} {BLOCKS[analysis['kind']]}, which are left out whole"
     lines = [f"{lost}."]
     if failed["where"]:
         words = {"low": "low", "high": "high", "ends": "low or high", "middle": "in the middle"}

@@ -129,6 +129,7 @@ def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[st
     sampled = list(study.inputs)
     wanted = config.report_outputs(study, model)
     analysis: dict[str, Any] = {
+        "kind": study.kind,
         "runs": len(runs),
         "status": {str(k): int(v) for k, v in runs["status"].value_counts().items()},
         "failures": locate_failures(runs[sampled], ~ended),

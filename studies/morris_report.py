@@ -37,7 +37,7 @@ def sections_of(
     return [
         Section(
             "Which factors matter",
-            summarise(analysis),
+            [*summarise(analysis), *_not_ranked(analysis)],
             [_table(name, analysis["outputs"][name]) for name in analysis["ranked"]],
             {
                 f"Mean size of the elementary effects (μ*), {reach}, with 95 % intervals. Factors "
@@ -104,6 +104,20 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
         lines.append(f"Not distinguishable from noise: {', '.join(style.words(f) for f in weak)}.")
     lines.append(f"Noise floor: {number(noise['value'], 2)}{suffix}.")
     return " ".join(lines)
+
+
+def _not_ranked(analysis: Mapping[str, Any]) -> list[str]:
+    missing = [
+        f"{style.words(name)} ({entry['trajectories']:,} of {analysis['trajectories']:,})"
+        for name, entry in analysis["outputs"].items()
+        if "factors" not in entry
+    ]
+    if not missing:
+        return []
+    return [
+        "Not ranked, because too few trajectories have a value in every row (no failed run, and a "
+        f"contact that the output is about): {', '.join(missing)}."
+    ]
 
 
 def _table(name: str, entry: Mapping[str, Any]) -> Table:

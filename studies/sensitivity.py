@@ -55,6 +55,9 @@ def measure_sensitivity(
         )
     if not isinstance(study, MonteCarloStudy | SobolStudy):
         raise UserError(f"{source.path}: a {study.kind} has no sampled inputs")
+    folder = out or ResultsFolder(Path(source.path) / "sensitivity")
+    if folder.path.resolve() == source.path.resolve():
+        raise UserError(f"{folder.path}: holds the study itself; choose another --out")
     model = load_study_model(study)
     if outputs:
         config.check_outputs(outputs, model, "--output")
@@ -98,7 +101,6 @@ def measure_sensitivity(
             "unit": unit_of[name], "runs": found.runs, "measures": measures
         }  # fmt: skip
         analysis["main_effects"][name] = main_effects_of(study, model, complete, name)
-    folder = out or ResultsFolder(Path(source.path) / "sensitivity")
     with folder.open_for_writing():
         folder.write_json("analysis.json", analysis)
         analysis = folder.read_json("analysis.json")

@@ -69,17 +69,20 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
             f"{max(1.0, 50.0 * (first[key]['high'] - first[key]['low'])):.0f} %"
             for key in clear[:NAMED]
         )
-        text = f"Of the variance of {words} goes with single inputs: {named}."
+        text = f"Some of the variance of {words} goes with single inputs: {named}."
     else:
         text = f"No single input stands out in the mean of {words}."
     others = [
         key
         for key in order
         if key not in clear
-        and all(entry["measures"][m]["inputs"][key]["clear"] for m in ("delta", "pawn"))
+        and any(entry["measures"][m]["inputs"][key]["clear"] for m in ("delta", "pawn"))
     ]
     if others:
-        text += f" Only the spread or shape goes with {', '.join(map(style.words, others))}."
+        text += (
+            f" Its distribution moves with {', '.join(map(style.words, others))} as well, though "
+            "no share of the variance is clear."
+        )
     none = [
         key
         for key in order

@@ -63,7 +63,7 @@ def analyse(study: SobolStudy, model: Model, runs: pd.DataFrame) -> dict[str, An
             "value in every row; no index is given"
         )
     # Of a block only A and B are drawn independently.
-    drawn = runs[np.isin(runs["run"] % block, (0, block - 1))]
+    drawn = runs[complete & np.isin(runs["run"] % block, (0, block - 1))]
     for name in ranked:
         column = names.index(name)
         held = kept[:, column]
@@ -101,6 +101,7 @@ def _entry(found: Indices, k: int, factors: Sequence[str]) -> dict[str, Any]:
         "variance": float(found.variance[k]),
         "noise_sd": float(np.sqrt(found.total[0, -1, k] * found.variance[k])),
     }
+    entry["alone"] = _estimate(found.first_sum[:, k])
     for kind, table in (("first", found.first), ("total", found.total)):
         entry[kind] = {name: _estimate(table[:, j, k]) for j, name in enumerate(factors)}
     if found.second is not None:

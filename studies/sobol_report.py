@@ -8,7 +8,7 @@ from mcstudy.figures import sensitivity, style
 from mcstudy.report import Section, Table
 from mcstudy.sensitivity.factors import DUMMY, NUDGE
 from mcstudy.sensitivity.saltelli import SCRAMBLES
-from mcstudy.text import number, quantity, share, unit
+from mcstudy.text import quantity, share
 from models.protocol import Model
 from studies.factor_report import groups_said
 from studies.failure_report import failure_map, failures_said, status_table
@@ -137,21 +137,32 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     else:
         lines.append(f"no factor on its own explains a share of the variance of {title} that is "
                      "clear of zero.")  # fmt: skip
-    alone = min(1.0, max(0.0, sum(first[factor]["value"] for factor in factors)))
+    alone = entry["alone"]
     lines.append(
-        f"All factors on their own explain {100.0 * alone:.0f} %; the rest are interactions"
-        + (" and chaos." if noise["value"] > 0.01 else ".")
+        f"All factors on their own explain {_share(alone)}; "
+        + (
+            "the rest are interactions" + (" and chaos." if noise["value"] > 0.01 else ".")
+            if alone["high"] < 1.0 - noise["high"]
+            else "interactions are not distinguishable from none."
+        )
     )
-    strongest = sorted(factors, key=lambda f: first[f]["value"] - total[f]["value"])[:2]
-    acting = [
-        f"{style.words(f)} ({100.0 * first[f]['value']:.0f} % alone, "
-        f"{100.0 * total[f]['value']:.0f} % with interactions)"
-        for f in strongest
-        if total[f]["low"] > first[f]["high"]
-    ]
-    if acting:
-        lines.append(f"Most through interactions: {', '.join(acting)}.")
-    weak = [f for f in factors if not total[f]["low"] > noise["high"]]
+    # What chaos does shows in every total index.
+    felt = [f for f in factors if total[f]["low"] > noise["high"]]
+    mixed = [f for f in felt if total[f]["low"] > first[f]["high"] + noise["high"]]
+    mixed.sort(key=lambda f: first[f]["value"] - total[f]["value"])
+    if mixed:
+        named = ", ".join(
+            f"{style.words(f)} ({_percent(first[f])} alone, {_percent(total[f])} with interactions)"
+            for f in mixed[:NAMED]
+        )
+        lines.append(f"Most through interactions: {named}.")
+    quiet = [f for f in felt if f not in clear and f not in mixed[:NAMED]]
+    if quiet:
+        lines.append(
+            "Clear of zero only with their interactions: "
+            f"{', '.join(style.words(f) for f in quiet)}."
+        )
+    weak = [f for f in factors if f not in felt and f not in clear]
     if weak:
         lines.append(
             "Not distinguishable from zero, even with interactions: "
@@ -159,7 +170,7 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
         )
     lines.append(
         f"{_share(noise)} of the variance belongs to no input: a nudge of all inputs by "
-        f"{NUDGE:g} of their range changes {title} by {_quantity(entry['noise_sd'], entry)} "
+        f"{NUDGE:g} of their range makes {title} scatter by {_quantity(entry['noise_sd'], entry)} "
         "(standard deviation)."
     )
     return " ".join(line[0].upper() + line[1:] for line in lines)
@@ -169,7 +180,12 @@ def _share(entry: Mapping[str, float]) -> str:
     value, half = 100.0 * entry["value"], 50.0 * (entry["high"] - entry["low"])
     if abs(value) < 0.5 and half < 0.5:
         return "less than 1 %"
-    return f"{value:.0f} ± {max(half, 1.0):.0f} %"
+    return f"{_percent(entry, ' ')}± {max(half, 1.0):.0f} %"
+
+
+def _percent(entry: Mapping[str, float], unit: str = " %") -> str:
+    # Below zero estimates are noise about it.
+    return f"{max(0, round(100.0 * entry['value']))}{unit}"
 
 
 def _quantity(value: float, entry: Mapping[str, Any]) -> str:
@@ -180,9 +196,8 @@ def _index_table(name: str, entry: Mapping[str, Any]) -> Table:
     order = sorted(entry["total"], key=lambda f: -(entry["total"][f]["value"] or 0.0))
     rows = [[style.words(f), share(entry["first"][f]), share(entry["total"][f])] for f in order]
     caption = (
-        f"{style.words(name)} [{unit(entry['unit']) or '–'}]: variance "
-        f"{number(entry['variance'])}, {entry['base_points']:,} base points. Negative estimates "
-        "are noise about zero."
+        f"{style.words(name)}: standard deviation {_quantity(entry['variance'] ** 0.5, entry)}, "
+        f"{entry['base_points']:,} base points. Negative estimates are noise about zero."
     )
     return Table(caption, ["factor", "first order (95 %)", "total (95 %)"], rows)
 
@@ -205,13 +220,13 @@ def _noise_table(analysis: Mapping[str, Any]) -> Table:
     rows = []
     for name, entry in analysis["outputs"].items():
         if entry.get("variance"):
-            share = entry["total"][DUMMY]
+            dummy = entry["total"][DUMMY]
             rows.append(
                 [
                     style.words(name),
                     _quantity(entry["variance"] ** 0.5, entry),
                     _quantity(entry["noise_sd"], entry),
-                    f"{100.0 * share['value']:.2f} %",
+                    f"{100.0 * dummy['value']:.2g} %",
                 ]
             )
     head = ["output", "standard deviation", "of it the noise floor", "share of the variance"]
@@ -223,7 +238,7 @@ def _convergence_said(analysis: Mapping[str, Any]) -> str:
         return "Some intervals could not be estimated: an output hardly ever changes."
     said = (
         f"The widest 95 % interval of a total index of the reported outputs is "
-        f"{analysis['widest']:.3f} wide, at {analysis['base_points']:,} base points."
+        f"{analysis['widest']:.3f} wide, with a design of {analysis['base_points']:,} base points."
     )
     tolerance = analysis["tolerance"]
     if tolerance is None:

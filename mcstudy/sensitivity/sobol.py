@@ -55,13 +55,14 @@ class Indices:
 
     Attributes
     ----------
-    first, total : (3, d, m) value, low, high.
+    first, total : (3, d, m) value, low, high. first_sum : (3, m) of all first-order indices.
     second : (3, d, d, m) upper triangle, NaN elsewhere; None if the design has no such blocks.
     variance : (m,). blocks : base points used.
     """
 
     first: Array
     total: Array
+    first_sum: Array
     second: Array | None
     variance: Array
     blocks: int
@@ -140,13 +141,14 @@ def estimate_indices(
     means, reach = _resampled(table, replicate, resamples, rng or np.random.default_rng(0))
     spread = _ratios(means, d, m, len(pairs))
     first, total = (_with_interval(best[k][0], spread[k], reach) for k in (0, 1))
+    first_sum = _with_interval(best[0][0].sum(axis=0), spread[0].sum(axis=1), reach)
     second = None
     if pairs:
         second = np.full((3, d, d, m), np.nan)
         found = _with_interval(best[2][0], spread[2], reach)
         for k, (i, j) in enumerate(pairs):
             second[:, i, j] = found[:, k]
-    return Indices(first, total, second, best[3][0], n)
+    return Indices(first, total, first_sum, second, best[3][0], n)
 
 
 def _terms(blocks: Blocks, mean: Array, pairs: Sequence[tuple[int, int]]) -> Array:

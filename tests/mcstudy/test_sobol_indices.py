@@ -384,11 +384,21 @@ def test_permuted_outputs_have_permuted_indices(order: list[int], seed: int) -> 
     moved = Indices(
         one.first[..., order],
         one.total[..., order],
+        one.first_sum[..., order],
         one.second[..., order],
         one.variance[order],
         one.blocks,
     )
     equal(moved, two, 1e-10)
+
+
+def test_the_sum_of_first_order_indices_has_an_interval_of_its_own() -> None:
+    found = estimate_indices(random_blocks(3, n=64, m=2), resamples=200)
+    np.testing.assert_allclose(found.first_sum[0], found.first[0].sum(axis=0), rtol=1e-12)
+    # Not the sum of the intervals: the indices of one sample go together.
+    assert np.all(found.first_sum[1] < found.first_sum[0])
+    half = found.first_sum[2] - found.first_sum[0]
+    assert np.all(half < (found.first[2] - found.first[0]).sum(axis=0))
 
 
 @QUIET

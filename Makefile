@@ -25,8 +25,8 @@ study: install  ## run the main job: the nominal case and the Monte Carlo study 
 case: install  ## run the nominal case only
 	$(BIN)/mcstudy reconstruct configs/paper_case.toml
 
-test: install  ## run the tests
-	$(BIN)/python -m pytest
+test: install  ## run the tests, on all cores
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 check: install  ## ruff, mypy and the import rules
 	$(BIN)/ruff check .

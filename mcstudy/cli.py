@@ -4,6 +4,7 @@ Exit codes: 0 done, 1 the study failed, 2 the user's input is wrong, 130 interru
 """
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -54,7 +55,8 @@ def run(
 
     folder = api.run_study(study, out=out, workers=workers, quiet=quiet or as_json)
     analysis = folder.read_json("analysis.json")
-    _print_analysis(analysis, folder.path, quiet=quiet, as_json=as_json)
+    summary = api.summarise(folder, analysis)
+    _print_analysis(analysis, summary, folder.path, quiet=quiet, as_json=as_json)
 
 
 @app.command()
@@ -77,10 +79,36 @@ def reconstruct(study: Study, out: Out = None, quiet: Quiet = False, as_json: Js
 def report(folder: Folder, quiet: Quiet = False, as_json: Json = False) -> None:
     """Rebuild analysis, figures and report of a results folder without running the model."""
     from mcstudy.results import ResultsFolder
-    from studies import monte_carlo
+    from studies import api
 
-    analysis = monte_carlo.build_report(ResultsFolder(folder))
-    _print_analysis(analysis, folder, quiet=quiet, as_json=as_json)
+    results = ResultsFolder(folder)
+    analysis = api.build_report(results)
+    summary = api.summarise(results, analysis)
+    _print_analysis(analysis, summary, folder, quiet=quiet, as_json=as_json)
+
+
+@app.command()
+def sensitivity(
+    folder: Folder,
+    output: Annotated[
+        list[str] | None, typer.Option(help="An output to rank; may be repeated.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Where to write; by default sensitivity in the folder.")
+    ] = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Measure what drives the outputs of any results folder, whatever its design was."""
+    from mcstudy.results import ResultsFolder
+    from studies import sensitivity, sensitivity_report
+
+    target = ResultsFolder(out or folder / "sensitivity")
+    analysis = sensitivity.measure_sensitivity(
+        ResultsFolder(folder), target, outputs=output or (), quiet=quiet or as_json
+    )
+    summary = sensitivity_report.summarise(analysis)
+    _print_analysis(analysis, summary, target.path, quiet=quiet, as_json=as_json)
 
 
 @app.command("fit-stiffness")
@@ -150,12 +178,15 @@ def status(folder: Folder, as_json: Json = False) -> None:
 
     results = ResultsFolder(folder)
     manifest = results.read_json("manifest.json")
+    total = int(manifest["design"]["n"])
     runs = results.done()
+    if runs is not None:
+        # A folder may hold runs of an earlier, larger design.
+        runs = runs[runs["run"] < total]
     done = 0 if runs is None else len(runs)
     counts = (
         {} if runs is None else {str(k): int(v) for k, v in runs["status"].value_counts().items()}
     )
-    total = int(manifest["design"]["n"])
     if as_json:
         _print_json({"done": done, "total": total, "counts": counts})
         return
@@ -190,30 +221,20 @@ def models(
         console.print(table)
 
 
-def _print_analysis(analysis: dict[str, Any], path: Path, *, quiet: bool, as_json: bool) -> None:
+def _print_analysis(
+    analysis: dict[str, Any], summary: Iterable[Any], path: Path, *, quiet: bool, as_json: bool
+) -> None:
     if as_json:
         _print_json({"folder": str(path), "analysis": analysis})
         return
     if quiet:
         return
-    from mcstudy.text import interval, number
-
     console = Console()
-    table = RichTable("output", "unit", "mean (95 % interval)", "5 %", "median", "95 %")
-    for name in analysis["convergence"]:
-        entry = analysis["outputs"][name]
-        if "mean" not in entry:
-            continue
-        q = entry["quantiles"]
-        table.add_row(
-            name,
-            entry["unit"],
-            interval(entry["mean"]),
-            *(number(q[p]["value"]) for p in ("0.05", "0.5", "0.95")),
-        )
-    console.print(table)
-    counts = ", ".join(f"{n} {status}" for status, n in analysis["status"].items())
-    console.print(f"{analysis['runs']} runs: {counts}")
+    for part in summary:
+        if isinstance(part, str):
+            console.print(part, markup=False, highlight=False)
+        else:
+            _print_table(console, part)
     console.print(f"report: {path / 'report.html'}", soft_wrap=True)
 
 

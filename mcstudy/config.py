@@ -2,169 +2,51 @@
 
 import hashlib
 import json
-import re
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    FiniteFloat,
-    NonNegativeInt,
-    Strict,
-    TypeAdapter,
-    ValidationError,
-    model_validator,
-)
+from pydantic import Field, TypeAdapter, ValidationError
 
 from mcstudy import designs, units
 from mcstudy.errors import UserError
 from mcstudy.inputs import (
     DISTRIBUTION_NAMES,
-    Distribution,
     copula_factor,
     sample_values,
     sampling_order,
 )
+from mcstudy.schema import (
+    KINDS,
+    ComparisonRow,
+    ComparisonTable,
+    FactorStudy,
+    MonteCarloStudy,
+    MorrisStudy,
+    Reconstruction,
+    SampledStudy,
+    SobolStudy,
+    Study,
+)
 from mcstudy.simulator import Simulator
+
+__all__ = [
+    "ComparisonRow",
+    "ComparisonTable",
+    "FactorStudy",
+    "MonteCarloStudy",
+    "MorrisStudy",
+    "Reconstruction",
+    "SampledStudy",
+    "SobolStudy",
+    "Study",
+]
 
 Array = NDArray[np.float64]
 
-FORMAT = "mcstudy-study/1"
-
-LARGEST_DESIGN = 10_000_000
-"""Runs that one study may have; their table fits a machine's memory."""
-LARGEST_SEED = 2**63 - 1
-
-
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class ModelChoice(_Table):
-    """``[model]``: name and options such as ``vehicle`` or ``hood_curve``."""
-
-    name: str
-    options: dict[str, str | FiniteFloat | list[list[FiniteFloat]]] = {}
-
-
-class Value(_Table):
-    """A fixed input: value and unit."""
-
-    value: FiniteFloat
-    unit: str = "1"
-
-
-class Reference(_Table):
-    """A known value of an output, drawn and judged beside the predictions."""
-
-    output: str
-    value: FiniteFloat
-    unit: str = "1"
-    label: str
-    kind: Literal["observed", "limit", "simulated"] = "observed"
-
-
-class Design(_Table):
-    """``[design]``: method, size and replicates."""
-
-    method: Literal["monte-carlo", "latin-hypercube", "sobol"] = "latin-hypercube"
-    n: Annotated[int, Field(gt=0, le=LARGEST_DESIGN)] = 2000
-    replicate_size: Annotated[int, Field(gt=0, le=LARGEST_DESIGN)] | None = None
-
-    @model_validator(mode="after")
-    def _multiple(self) -> "Design":
-        size = self.size
-        if self.method == "monte-carlo" and size != 1:
-            raise ValueError("replicate_size does not apply to monte-carlo: leave it out")
-        if self.method != "monte-carlo" and size < 2:
-            raise ValueError("replicate_size must be 2 or more: intervals come from replicates")
-        if self.method == "sobol" and size & (size - 1):
-            raise ValueError(f"replicate_size ({size}) of a sobol design must be a power of two")
-        if self.n % size:
-            raise ValueError(
-                f"n ({self.n}) must be a multiple of replicate_size ({size}), "
-                f"e.g. {size * max(1, round(self.n / size))}"
-            )
-        return self
-
-    @property
-    def size(self) -> int:
-        """Samples of one replicate."""
-        return self.replicate_size or designs.DEFAULT_REPLICATE_SIZE[self.method]
-
-
-class Dependence(_Table):
-    """``[dependence]``: correlations of normal scores, pairs of inputs."""
-
-    correlations: list[Annotated[tuple[str, str, FiniteFloat], Strict(False)]] = []
-
-
-class Report(_Table):
-    """``[report]``: outputs to draw (see ``report_outputs``), references, histories kept."""
-
-    outputs: Annotated[list[str], Field(min_length=1)] | None = None
-    histories: NonNegativeInt = 8
-    references: list[Reference] = []
-
-
-class _Common(_Table):
-    format: Literal["mcstudy-study/1"]
-    name: str
-    title: str
-    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 0
-    model: ModelChoice
-    fixed: dict[str, Value] = {}
-
-    @model_validator(mode="after")
-    def _plain_name(self) -> "_Common":
-        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,79}", self.name) or ".." in self.name:
-            raise ValueError(
-                f"name {self.name!r} must be letters, digits, '_', '-' or '.', as it names a folder"
-            )
-        return self
-
-
-class MonteCarloStudy(_Common):
-    """``kind = "monte-carlo"``: sample inputs, run, describe the outputs."""
-
-    kind: Literal["monte-carlo"]
-    design: Design = Design()
-    inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
-    dependence: Dependence = Dependence()
-    max_failure_rate: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
-    report: Report = Report()
-
-
-class ComparisonRow(_Table):
-    """A row of a table to print beside our run."""
-
-    label: str
-    values: dict[str, FiniteFloat]
-
-
-class ComparisonTable(_Table):
-    """A table of outputs: title, outputs with the unit of the printed values, rows."""
-
-    title: str
-    units: dict[str, str]
-    rows: list[ComparisonRow]
-
-
-class Reconstruction(_Common):
-    """``kind = "reconstruction"``: one nominal run, printed and drawn."""
-
-    kind: Literal["reconstruction"]
-    tables: list[ComparisonTable] = []
-    strip_times: Annotated[list[FiniteFloat], Field(min_length=1)] = [0.0, 0.02, 0.04, 0.06, 0.08]
-
-
-Study = MonteCarloStudy | Reconstruction
 _STUDY: TypeAdapter[Study] = TypeAdapter(Annotated[Study, Field(discriminator="kind")])
 
 
@@ -202,7 +84,7 @@ def first_problem(error: ValidationError) -> str:
     problem = error.errors(include_url=False)[0]
     parts = [str(part) for part in problem["loc"]]
     # Pydantic puts the chosen kind of study and of distribution into the place; the file does not.
-    if parts and parts[0] in ("monte-carlo", "reconstruction"):
+    if parts and parts[0] in KINDS:
         parts = parts[1:]
     if len(parts) > 2 and parts[0] == "inputs" and parts[2] in DISTRIBUTION_NAMES:
         del parts[2]
@@ -261,6 +143,25 @@ def sample_inputs(study: MonteCarloStudy, model: Simulator) -> dict[str, Array]:
     UserError
         If names, units, dependence or ranges do not fit the model.
     """
+    uniforms = designs.draw(
+        study.design.method, study.design.n, study.design.size, len(study.inputs), study.seed
+    )
+    return map_inputs(study, model, uniforms)
+
+
+def map_inputs(study: SampledStudy, model: Simulator, uniforms: Array) -> dict[str, Array]:
+    """Return the (n,) values of every input of the model, in its units, for independent uniforms.
+
+    Parameters
+    ----------
+    study : with inputs and their dependence. model : Simulator.
+    uniforms : (n, d) in (0, 1), columns in the order of ``study.inputs``.
+
+    Raises
+    ------
+    UserError
+        If names, units, dependence or ranges do not fit the model.
+    """
     known = {item.name: item for item in model.inputs}
     for name in study.inputs:
         if name not in known:
@@ -276,9 +177,6 @@ def sample_inputs(study: MonteCarloStudy, model: Simulator) -> dict[str, Array]:
         factor = copula_factor(list(study.inputs), study.dependence.correlations)
     except ValueError as error:
         raise UserError(f"dependence: {error}") from None
-    uniforms = designs.draw(
-        study.design.method, study.design.n, study.design.size, len(study.inputs), study.seed
-    )
     try:
         sampled = sample_values(uniforms, study.inputs, factor)
     except ValueError as error:
@@ -297,14 +195,31 @@ def sample_inputs(study: MonteCarloStudy, model: Simulator) -> dict[str, Array]:
                 )
             columns[item.name] = values
         else:
-            columns[item.name] = np.full(study.design.n, fixed.get(item.name, item.nominal))
+            columns[item.name] = np.full(len(uniforms), fixed.get(item.name, item.nominal))
     return columns
+
+
+def check_independent(study: FactorStudy) -> None:
+    """Raise ``UserError`` if inputs of different factors depend on each other."""
+    member = {name: group for group, names in study.groups.items() for name in names}
+    pairs = [(a, b) for a, b, value in study.dependence.correlations if value != 0.0]
+    pairs += [(name, parent) for name, d in study.inputs.items() for parent in d.parents]
+    for first, second in pairs:
+        # What is not sampled at all is refused with the dependence itself.
+        if first not in study.inputs or second not in study.inputs:
+            continue
+        if member.get(first, first) != member.get(second, second):
+            raise UserError(
+                f"dependence: {first!r} and {second!r} depend on each other, and a {study.kind} "
+                "study exchanges one factor at a time: put both into one group, or run a "
+                "monte-carlo study and 'mcstudy sensitivity' on its folder"
+            )
 
 
 USUAL_OUTPUTS = ("hic15", "throw_distance", "wad")
 
 
-def report_outputs(study: MonteCarloStudy, model: Simulator) -> list[str]:
+def report_outputs(study: SampledStudy, model: Simulator) -> list[str]:
     """Return the outputs that a study's report draws.
 
     Raises
@@ -329,7 +244,7 @@ def check_outputs(names: Sequence[str], model: Simulator, place: str) -> None:
             )
 
 
-def numbers_digest(study: MonteCarloStudy, model: Simulator) -> dict[str, str]:
+def numbers_digest(study: SampledStudy, model: Simulator) -> dict[str, str]:
     """Return, by topic, what changes the numbers of a study, as canonical JSON.
 
     Two studies whose digests are equal give the same row for the same run id; n is left out
@@ -339,11 +254,19 @@ def numbers_digest(study: MonteCarloStudy, model: Simulator) -> dict[str, str]:
     topics = {
         "model": [table["model"], model.version],
         "seed": table["seed"],
-        "design.method": table["design"]["method"],
-        "design.replicate_size": study.design.size,
         "dependence": table["dependence"],
         "inputs": list(table["inputs"]),
     }
+    if isinstance(study, MonteCarloStudy):
+        topics["design.method"] = study.design.method
+        topics["design.replicate_size"] = study.design.size
+    else:
+        topics["kind"] = study.kind
+        topics["groups"] = {group: sorted(names) for group, names in table["groups"].items()}
+        if isinstance(study, SobolStudy):
+            topics["design.second_order"] = study.design.second_order
+        else:
+            topics["design.levels"] = study.design.levels
     topics |= {f"inputs.{name}": entry for name, entry in table["inputs"].items()}
     topics |= {f"fixed.{name}": entry for name, entry in table["fixed"].items()}
     return {key: json.dumps(value, sort_keys=True) for key, value in topics.items()}

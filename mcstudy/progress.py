@@ -9,6 +9,13 @@ from typing import TextIO, TypeVar
 Item = TypeVar("Item")
 
 
+def say(text: str, *, quiet: bool = False, stream: TextIO = sys.stderr) -> None:
+    """Print a line on a terminal; nothing where nobody looks."""
+    if not quiet and stream.isatty():
+        stream.write(f"{text}\n")
+        stream.flush()
+
+
 def follow(
     items: Sequence[Item], what: str, *, quiet: bool = False, stream: TextIO | None = None
 ) -> Iterator[Item]:

@@ -7,6 +7,9 @@ import numpy as np
 
 DESIGN = 0
 BOOTSTRAP = 1
+SALTELLI = 2
+GIVEN_DATA = 3
+MORRIS = 4
 
 
 def generator(seed: int, stream: int, index: int = 0) -> np.random.Generator:

@@ -35,6 +35,16 @@ def interval(estimate: Mapping[str, float | None], digits: int = 3) -> str:
     return f"{number(estimate['value'], digits)} ({number(low, digits)} to {number(high, digits)})"
 
 
+def share(estimate: Mapping[str, float | None]) -> str:
+    """Return ``value (low to high)`` of a share, with two decimals."""
+    shown = [estimate[key] for key in ("value", "low", "high")]
+    value, low, high = (
+        "–" if v is None or not math.isfinite(v) else f"{v:.2f}".replace("-0.00", "0.00")
+        for v in shown
+    )
+    return value if "–" in (low, high) else f"{value} ({low} to {high})"
+
+
 def percent(estimate: Mapping[str, float | None]) -> str:
     """Return a probability with its interval in per cent."""
     value, low, high = (estimate[k] for k in ("value", "low", "high"))

@@ -8,14 +8,45 @@ Examples
 >>> head = rerun(results, run=17).histories["head"]                 # doctest: +SKIP
 """
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from mcstudy.config import MonteCarloStudy, Reconstruction, Study, load_study
+from mcstudy.config import Reconstruction, Study, load_study
 from mcstudy.errors import UserError
+from mcstudy.report import Table
 from mcstudy.results import ResultsFolder
 from models.protocol import Run
-from studies.monte_carlo import load_study_model, run_monte_carlo
+from studies import monte_carlo, monte_carlo_report, morris, morris_report, sobol, sobol_report
+from studies.execution import load_study_model
 from studies.reconstruction import Comparison, reconstruct, write_reconstruction
+
+
+@dataclass(frozen=True)
+class Pipeline:
+    """A kind of sampled study.
+
+    Attributes
+    ----------
+    run : (study, its text, folder, workers, quiet) to the analysis.
+    build_report : folder to the analysis, without running the model.
+    summarise : analysis to what the command line prints, paragraphs and tables.
+    """
+
+    run: Callable[..., dict[str, Any]]
+    build_report: Callable[[ResultsFolder], dict[str, Any]]
+    summarise: Callable[[Mapping[str, Any]], list[str] | list[Table]]
+
+
+PIPELINES = {
+    "monte-carlo": Pipeline(
+        monte_carlo.run_monte_carlo, monte_carlo.build_report, monte_carlo_report.summarise
+    ),
+    "sobol": Pipeline(sobol.run_sobol, sobol.build_report, sobol_report.summarise),
+    "morris": Pipeline(morris.run_morris, morris.build_report, morris_report.summarise),
+}
+"""A new kind of study is its modules, its class in ``mcstudy.schema`` and one line here."""
 
 
 def results_folder(study: Study, out: Path | str | None = None) -> ResultsFolder:
@@ -30,7 +61,7 @@ def run_study(
     workers: int = -1,
     quiet: bool = True,
 ) -> ResultsFolder:
-    """Run a Monte Carlo study file, or go on with it where it stopped.
+    """Run a study file of any sampled kind, or go on with it where it stopped.
 
     Parameters
     ----------
@@ -52,12 +83,37 @@ def run_study(
         If too many runs failed.
     """
     study = load_study(path)
-    if not isinstance(study, MonteCarloStudy):
+    if study.kind not in PIPELINES:
         raise UserError(f"{path}: kind {study.kind!r} is run by 'mcstudy reconstruct'")
     folder = results_folder(study, out)
     text = Path(path).read_text(encoding="utf-8")
-    run_monte_carlo(study, text, folder, workers=workers, quiet=quiet)
+    PIPELINES[study.kind].run(study, text, folder, workers=workers, quiet=quiet)
     return folder
+
+
+def build_report(folder: ResultsFolder) -> dict[str, Any]:
+    """Rebuild analysis, figures and report of a results folder, without running the model.
+
+    Raises
+    ------
+    UserError
+        If the folder holds no study that has runs.
+    """
+    study = load_study(folder.path / "study.toml")
+    if study.kind not in PIPELINES:
+        raise UserError(f"{folder.path}: a {study.kind} is drawn again by 'mcstudy reconstruct'")
+    return PIPELINES[study.kind].build_report(folder)
+
+
+def summarise(folder: ResultsFolder, analysis: Mapping[str, Any]) -> list[str | Table]:
+    """Return the analysis of a study's folder in a few paragraphs and tables."""
+    kind = load_study(folder.path / "study.toml").kind
+    return [*PIPELINES[kind].summarise(analysis), _counted(analysis)]
+
+
+def _counted(analysis: Mapping[str, Any]) -> str:
+    counts = ", ".join(f"{n} {status}" for status, n in analysis["status"].items())
+    return f"{analysis['runs']} runs: {counts}"
 
 
 def run_case(

@@ -1,4 +1,4 @@
-"""Remake the README's pictures from the nominal case, the full study and the validation."""
+"""Remake the README's pictures from the nominal case, the full studies and the validation."""
 
 import shutil
 from pathlib import Path
@@ -15,6 +15,7 @@ def main() -> None:
     """Run the case and the study and copy the chosen pictures to ``results/gallery``."""
     _, _, case = run_case("configs/paper_case.toml")
     study = run_study("configs/paper_study.toml", quiet=False)
+    drivers = run_study("configs/paper_sobol.toml", quiet=False)
     hood = ResultsFolder("results/stiffness_hood_tests")
     fit_stiffness_of(Path("configs/hood_tests"), hood)
     validation = ResultsFolder("results/validation_throw")
@@ -23,6 +24,7 @@ def main() -> None:
     for folder, names in (
         (case, ("kinematics.png", "head_acceleration.png", "crash.gif")),
         (study, ("distributions.png", "throw_and_wad.png", "rank_correlation.png")),
+        (drivers, ("indices.png", "main_effects_hic15.png")),
         (hood, ("force_penetration.png", "corridor.png")),
     ):
         for name in names:

@@ -1,43 +1,22 @@
 """The Monte Carlo study: sample the inputs, run the model, describe what comes out."""
 
-import os
-import platform
-import time
 from collections.abc import Mapping
-from importlib.metadata import version
 from typing import Any
 
-import joblib
 import numpy as np
 import pandas as pd
 
-from mcstudy import config, runner, statistics, units
+from mcstudy import config, statistics, units
 from mcstudy.config import MonteCarloStudy, load_study
 from mcstudy.errors import UserError
+from mcstudy.failures import locate_failures
 from mcstudy.figures import distributions, relations, style
-from mcstudy.progress import Progress
 from mcstudy.report import render
-from mcstudy.results import ResultsFolder, check_failures, digest
+from mcstudy.results import ResultsFolder
 from models.protocol import Model, complete_status
-from models.registry import load_model
-from studies import evaluation
+from studies.execution import load_study_model, run_rows
+from studies.failure_report import failure_map
 from studies.monte_carlo_report import sections_of
-
-PACKAGES = ("numpy", "scipy", "numba", "pandas", "joblib", "pyarrow")
-
-
-def load_study_model(study: config.Study) -> Model:
-    """Return the model of a study.
-
-    Raises
-    ------
-    UserError
-        If the model or an option is unknown.
-    """
-    try:
-        return load_model(study.model.name, study.model.options)
-    except (ValueError, TypeError) as error:
-        raise UserError(f"model: {error}") from None
 
 
 def run_monte_carlo(
@@ -77,41 +56,15 @@ def run_monte_carlo(
     config.report_outputs(study, model)
     marks_of(study, model)
     columns = config.sample_inputs(study, model)
-    topics = config.numbers_digest(study, model)
-    folder.check_same_study(topics)
-    rows = np.stack([columns[item.name] for item in model.inputs], axis=1)
-    task = runner.Task(
-        evaluate=evaluation.evaluate,
-        argument={
-            "name": study.model.name,
-            "options": study.model.options,
-            "version": model.version,
-        },
-        inputs=rows,
-        input_names=[item.name for item in model.inputs],
-        output_names=[item.name for item in model.outputs],
-        replicate=np.arange(study.design.n) // study.design.size,
-    )
-    complete = complete_status(model)
+    folder.check_same_study(config.numbers_digest(study, model))
+    size = study.design.size
     with folder.open_for_writing():
         folder.write_text("study.toml", text)
-        manifest = _manifest(study, model, topics, workers)
-        if not (folder.path / "manifest.json").exists():
-            folder.write_json("manifest.json", manifest)
-        start = time.perf_counter()
-        with joblib.parallel_config(backend="loky", n_jobs=workers):
-            runs = runner.run(task, folder, Progress(quiet=quiet, complete=complete))
-        # A study that was larger before keeps its further runs.
-        folder.compact(held if (held := folder.done()) is not None else runs)
-        counts = {str(k): int(v) for k, v in runs["status"].value_counts().items()}
-        manifest |= {
-            "wall_time_s": round(time.perf_counter() - start, 3),
-            "counts": counts,
-            "digest": digest(runs),
-            "finished": True,
-        }
-        folder.write_json("manifest.json", manifest)
-        check_failures(counts, set(counts) - complete, study.max_failure_rate)
+        runs = run_rows(
+            study, model, columns, folder,
+            design={"method": study.design.method, "n": study.design.n, "replicate_size": size},
+            replicate=np.arange(study.design.n) // size, workers=workers, quiet=quiet,
+        )  # fmt: skip
         _keep_histories(study, model, runs, folder)
         return build_report(folder)
 
@@ -130,13 +83,12 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
     model = load_study_model(study)
     runs = folder.runs()
     runs = runs[runs["run"] < study.design.n]
-    manifest = folder.read_json("manifest.json")
     analysis = analyse(study, model, runs)
     folder.write_json("analysis.json", analysis)
     analysis = folder.read_json("analysis.json")
     figures = draw(study, model, runs, analysis)
     style.save(figures, folder.path / "figures")
-    sections = sections_of(study, model, runs, manifest, analysis, figures)
+    sections = sections_of(study, model, runs, analysis, figures)
     subtitle = (
         f"Monte Carlo study of {len(runs):,} runs of the {model.name} model, "
         f"{study.design.method} design, seed {study.seed}"
@@ -170,14 +122,17 @@ def marks_of(study: MonteCarloStudy, model: Model) -> dict[str, list[distributio
 
 def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[str, Any]:
     """Return every number that the report prints."""
-    complete = runs[runs["status"].isin(complete_status(model))]
+    ended = runs["status"].isin(complete_status(model)).to_numpy(dtype=bool)
+    complete = runs[ended]
     groups = None if study.design.method == "monte-carlo" else complete["replicate"].to_numpy()
     marks = marks_of(study, model)
     sampled = list(study.inputs)
     wanted = config.report_outputs(study, model)
     analysis: dict[str, Any] = {
+        "kind": study.kind,
         "runs": len(runs),
         "status": {str(k): int(v) for k, v in runs["status"].value_counts().items()},
+        "failures": locate_failures(runs[sampled], ~ended),
         "outputs": {},
         "exceedance": {},
         "observed": {},
@@ -224,9 +179,10 @@ def draw(
     # An output without a value in any run has nothing to draw.
     wanted = {name: unit_of[name] for name in analysis["convergence"]}
     marks = marks_of(study, model)
+    figures = failure_map(analysis)
     if not wanted:
-        return {}
-    figures = {
+        return figures
+    figures |= {
         "distributions": distributions.draw_distributions(
             complete, wanted, marks, analysis["outputs"]
         ),
@@ -260,25 +216,3 @@ def _keep_histories(
         row = runs.iloc[k]
         run = model.run({name: float(row[name]) for name in names})
         folder.add_histories(int(row["run"]), run.histories)
-
-
-def _manifest(
-    study: MonteCarloStudy, model: Model, topics: Mapping[str, str], workers: int
-) -> dict[str, Any]:
-    return {
-        "format": "mcstudy-results/1",
-        "study": study.name,
-        "kind": study.kind,
-        "seed": study.seed,
-        "model": {"name": model.name, "version": model.version, "options": study.model.options},
-        "design": {"method": study.design.method, "n": study.design.n,
-                   "replicate_size": study.design.size},
-        "numbers": dict(topics),
-        "hash": config.hash_of(dict(topics)),
-        "versions": {"mcstudy": version("mcstudy"), "python": platform.python_version()}
-        | {name: version(name) for name in PACKAGES},
-        "machine": {"system": platform.system(), "processor": platform.machine(),
-                    "cores": os.cpu_count()},
-        "workers": workers,
-        "finished": False,
-    }  # fmt: skip

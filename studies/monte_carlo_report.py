@@ -1,6 +1,6 @@
 """The report of a Monte Carlo study: what its numbers say, in words, tables and pictures."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,13 +12,13 @@ from mcstudy.figures import style
 from mcstudy.report import Section, Table
 from mcstudy.text import interval, number, percent, quantity, unit
 from models.protocol import Model
+from studies.failure_report import failures_said, status_table
 
 
 def sections_of(
     study: MonteCarloStudy,
     model: Model,
     runs: pd.DataFrame,
-    manifest: Mapping[str, Any],
     analysis: Mapping[str, Any],
     figures: Mapping[str, Any],
 ) -> list[Section]:
@@ -32,6 +32,7 @@ def sections_of(
         "rank_correlation": "Spearman rank correlation of inputs and outputs; grey: not "
         "distinguishable from zero.",
         "convergence": "Median over growing parts of the study.",
+        "failures": "Share of failed runs in each tenth of each input.",
     }
 
     def pick(*names: str) -> dict[str, Any]:
@@ -45,10 +46,25 @@ def sections_of(
             "Rank correlations say which inputs an output follows, one at a time; they are no "
             "share of variance.",), (), pick("impact_speed", "rank_correlation")),
         Section("Inputs", (), [_input_table(study, model, runs)]),
-        Section("How sure the numbers are", (_honesty(study),), [_status_table(manifest)],
-                pick("convergence")),
+        Section("How sure the numbers are", [_honesty(study), *failures_said(analysis)],
+                [status_table(analysis)], pick("convergence", "failures")),
         Section("The model", _model_notes(model)),
     ]  # fmt: skip
+
+
+def summarise(analysis: Mapping[str, Any]) -> list[Table]:
+    """Return the distributions of the reported outputs as a short table."""
+    rows = []
+    for name in analysis["convergence"]:
+        entry = analysis["outputs"][name]
+        if "mean" in entry:
+            q = entry["quantiles"]
+            rows.append(
+                [name, entry["unit"], interval(entry["mean"]),
+                 *(number(q[p]["value"]) for p in ("0.05", "0.5", "0.95"))]
+            )  # fmt: skip
+    head = ["output", "unit", "mean (95 % interval)", "5 %", "median", "95 %"]
+    return [Table("", head, rows)]
 
 
 def _title(name: str) -> str:
@@ -127,13 +143,6 @@ def _input_table(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> Ta
         rows.append([item.name, *shown, item.meaning])
     head = ["input", "distribution", "5 %", "median or value", "95 %", "unit", "meaning"]
     return Table("Inputs as sampled, in the study file's units.", head, rows)
-
-
-def _status_table(manifest: Mapping[str, Any]) -> Table:
-    rows: Sequence[Sequence[str]] = [
-        [status, f"{count:,}"] for status, count in manifest["counts"].items()
-    ]
-    return Table("How the runs ended.", ["status", "runs"], rows)
 
 
 def _honesty(study: MonteCarloStudy) -> str:

@@ -14,7 +14,7 @@ from mcstudy.results import ResultsFolder
 from mcstudy.text import number, quantity, unit
 from models.protocol import Model, Run, complete_status
 from studies.exchange import write_isomme
-from studies.monte_carlo import load_study_model
+from studies.execution import load_study_model
 
 PRIMARY = 0.12
 """s after first contact that the histories show: the impact on the car."""

@@ -38,6 +38,12 @@ LABELS = {
     "throw_distance": "throw distance",
     "wad": "wrap-around distance (WAD)",
     "clip_3ms": "3 ms head acceleration",
+    "clip_3ms_consecutive": "3 ms clip (consecutive)",
+    "bric": "BrIC",
+    "ground_hic15": "HIC15 on the road",
+    "friction_body_road": "friction body–road",
+    "friction_body_car": "friction body–car",
+    "friction_tyre_road": "friction tyre–road",
 }
 _UNIT_TEXT = {"1": "", "m/s2": "m/s²", "rad/s2": "rad/s²"}
 

@@ -172,12 +172,17 @@ def test_impacts_of_any_size_keep_the_law(
     assert impact.force.min() >= 0.0
     assert impact.force[0] == 0.0
     assert impact.time.shape == impact.force.shape == impact.deflection.shape
-    # Loading follows the curve, nothing lies above it.
+    # Loading follows the curve. Nothing lies above it, but the unloading line of the base law on a
+    # curve that stiffens faster than that line falls.
     peak = int(np.argmax(impact.force))
     np.testing.assert_allclose(
         impact.force[: peak + 1], curve.at(impact.deflection[: peak + 1]), rtol=1e-9, atol=1e-6
     )
-    assert (impact.force <= curve.at(impact.deflection) * (1.0 + 1e-9) + 1e-6).all()
+    deepest = impact.deflection[peak]
+    slope = curve.unloading_ratio * impact.force[peak] / deepest
+    line = impact.force[peak] + slope * (impact.deflection - deepest)
+    highest = np.maximum(curve.at(impact.deflection), line)
+    assert (impact.force <= highest * (1.0 + 1e-9) + 1e-6).all()
     # The impactor is slowed, the deflection its way less the body's.
     impactor, surface = speeds(impact, mass, speed)
     assert impactor[-1] < speed

@@ -22,7 +22,7 @@ from models.protocol import OK
 from models.registry import load_model
 from studies import example_tests
 from studies.api import rerun, run_case, run_study
-from studies.monte_carlo import load_study_model
+from studies.execution import load_study_model
 from studies.stiffness import fit_stiffness_of
 
 EXAMPLE = Path("configs/hood_tests")

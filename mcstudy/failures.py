@@ -1,0 +1,69 @@
+"""Failed runs: how many, and where in the space of inputs."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+Flags = NDArray[np.bool_]
+
+PARTS = 10
+"""Parts of equal counts into which an input's range is cut."""
+SURE = 2.5
+"""Standard deviations beyond which failures count as uneven (assumed): one input in forty is so by
+chance."""
+
+
+def locate_failures(inputs: pd.DataFrame, failed: Flags, block: int = 1) -> dict[str, Any]:
+    """Return how many runs failed and where.
+
+    Parameters
+    ----------
+    inputs : (n, d) sampled inputs. failed : (n,).
+    block : rows that belong together, such as a base point's; they count as one when the scatter of
+        failures is judged.
+
+    Returns
+    -------
+    dict
+        ``runs``, ``share``, ``blocks`` (blocks with a failed run), ``map`` (share of failed runs in
+        each tenth of each input) and ``where``: for inputs along which failures are not spread
+        evenly, their mean rank, 0 lowest to 1 highest, and whether they lie ``low``, ``high``, at
+        both ``ends`` or in the ``middle``.
+    """
+    n = len(inputs)
+    count = int(failed.sum())
+    blocks = np.arange(n) // block
+    hit = np.unique(blocks[failed])
+    entry: dict[str, Any] = {
+        "runs": count,
+        "share": count / n if n else 0.0,
+        "blocks": int(hit.size),
+        "where": {},
+        "map": {},
+    }
+    if not count:
+        return entry
+    ranks = (inputs.rank().to_numpy() - 0.5) / n
+    # Rows of a block share inputs: one mean rank a block, which scatters no more than a uniform.
+    lost_ranks = pd.DataFrame(ranks[failed])
+    means = lost_ranks.groupby(blocks[failed]).mean().mean().to_numpy()
+    from_middle = (lost_ranks - 0.5).abs().groupby(blocks[failed]).mean().mean().to_numpy()
+    # Standard deviations of a uniform and of its distance from the middle, over the blocks.
+    noise, middle_noise = np.sqrt(1.0 / 12.0 / hit.size), np.sqrt(1.0 / 48.0 / hit.size)
+    part = np.minimum((ranks * PARTS).astype(int), PARTS - 1)
+    for k, name in enumerate(map(str, inputs.columns)):
+        total = np.bincount(part[:, k], minlength=PARTS)
+        lost = np.bincount(part[failed, k], minlength=PARTS)
+        entry["map"][name] = (lost / np.maximum(total, 1)).tolist()
+        place = None
+        if inputs.iloc[:, k].nunique() < 2:
+            continue
+        if abs(means[k] - 0.5) > SURE * noise:
+            place = "high" if means[k] > 0.5 else "low"
+        elif abs(from_middle[k] - 0.25) > SURE * middle_noise:
+            place = "ends" if from_middle[k] > 0.25 else "middle"
+        if place:
+            entry["where"][name] = {"mean_rank": float(means[k]), "place": place}
+    return entry

@@ -1,0 +1,239 @@
+"""What a study file may hold: one class a table, one class a kind of study."""
+
+import re
+from typing import Annotated, Literal, get_args
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    NonNegativeInt,
+    Strict,
+    model_validator,
+)
+
+from mcstudy import designs
+from mcstudy.inputs import Distribution
+from mcstudy.sensitivity.blocks import FEWEST_BLOCKS
+from mcstudy.sensitivity.factors import DUMMY
+
+LARGEST_DESIGN = 10_000_000
+"""Runs that one study may have; their table fits a machine's memory."""
+LARGEST_SEED = 2**63 - 1
+
+
+class StudyTable(BaseModel):
+    """A table of a study file: strict, and nothing unknown in it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class ModelChoice(StudyTable):
+    """``[model]``: name and options such as ``vehicle`` or ``hood_curve``."""
+
+    name: str
+    options: dict[str, str | FiniteFloat | list[list[FiniteFloat]]] = {}
+
+
+class Value(StudyTable):
+    """A fixed input: value and unit."""
+
+    value: FiniteFloat
+    unit: str = "1"
+
+
+class Reference(StudyTable):
+    """A known value of an output, drawn and judged beside the predictions."""
+
+    output: str
+    value: FiniteFloat
+    unit: str = "1"
+    label: str
+    kind: Literal["observed", "limit", "simulated"] = "observed"
+
+
+class Design(StudyTable):
+    """``[design]``: method, size and replicates."""
+
+    method: Literal["monte-carlo", "latin-hypercube", "sobol"] = "latin-hypercube"
+    n: Annotated[int, Field(gt=0, le=LARGEST_DESIGN)] = 2000
+    replicate_size: Annotated[int, Field(gt=0, le=LARGEST_DESIGN)] | None = None
+
+    @model_validator(mode="after")
+    def _multiple(self) -> "Design":
+        size = self.size
+        if self.method == "monte-carlo" and size != 1:
+            raise ValueError("replicate_size does not apply to monte-carlo: leave it out")
+        if self.method != "monte-carlo" and size < 2:
+            raise ValueError("replicate_size must be 2 or more: intervals come from replicates")
+        if self.method == "sobol" and size & (size - 1):
+            raise ValueError(f"replicate_size ({size}) of a sobol design must be a power of two")
+        if self.n % size:
+            raise ValueError(
+                f"n ({self.n}) must be a multiple of replicate_size ({size}), "
+                f"e.g. {size * max(1, round(self.n / size))}"
+            )
+        return self
+
+    @property
+    def size(self) -> int:
+        """Samples of one replicate."""
+        return self.replicate_size or designs.DEFAULT_REPLICATE_SIZE[self.method]
+
+
+class Dependence(StudyTable):
+    """``[dependence]``: correlations of normal scores, pairs of inputs."""
+
+    correlations: list[Annotated[tuple[str, str, FiniteFloat], Strict(False)]] = []
+
+
+class Report(StudyTable):
+    """``[report]``: outputs to draw (see ``report_outputs``), references, histories kept."""
+
+    outputs: Annotated[list[str], Field(min_length=1)] | None = None
+    histories: NonNegativeInt = 8
+    references: list[Reference] = []
+
+
+class CommonStudy(StudyTable):
+    """What every kind of study has."""
+
+    format: Literal["mcstudy-study/1"]
+    name: str
+    title: str
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 0
+    model: ModelChoice
+    fixed: dict[str, Value] = {}
+
+    @model_validator(mode="after")
+    def _plain_name(self) -> "CommonStudy":
+        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,79}", self.name) or ".." in self.name:
+            raise ValueError(
+                f"name {self.name!r} must be letters, digits, '_', '-' or '.', as it names a folder"
+            )
+        return self
+
+
+class MonteCarloStudy(CommonStudy):
+    """``kind = "monte-carlo"``: sample inputs, run, describe the outputs."""
+
+    kind: Literal["monte-carlo"]
+    design: Design = Design()
+    inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
+    dependence: Dependence = Dependence()
+    max_failure_rate: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
+    report: Report = Report()
+
+
+class ComparisonRow(StudyTable):
+    """A row of a table to print beside our run."""
+
+    label: str
+    values: dict[str, FiniteFloat]
+
+
+class ComparisonTable(StudyTable):
+    """A table of outputs: title, outputs with the unit of the printed values, rows."""
+
+    title: str
+    units: dict[str, str]
+    rows: list[ComparisonRow]
+
+
+class Reconstruction(CommonStudy):
+    """``kind = "reconstruction"``: one nominal run, printed and drawn."""
+
+    kind: Literal["reconstruction"]
+    tables: list[ComparisonTable] = []
+    strip_times: Annotated[list[FiniteFloat], Field(min_length=1)] = [0.0, 0.02, 0.04, 0.06, 0.08]
+
+
+class FactorStudy(CommonStudy):
+    """What kinds of study have that exchange one factor, an input or a group, after the other."""
+
+    kind: str
+    inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
+    dependence: Dependence = Dependence()
+    groups: dict[str, Annotated[list[str], Field(min_length=1)]] = {}
+    max_failure_rate: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
+
+    @model_validator(mode="after")
+    def _grouped_once(self) -> "FactorStudy":
+        for table, taken in (("inputs", [*self.inputs]), ("groups", [*self.groups])):
+            if DUMMY in taken:
+                raise ValueError(
+                    f"{table}.{DUMMY}: this name is the factor's that stands for no input"
+                )
+        seen: dict[str, str] = {}
+        for group, names in self.groups.items():
+            if group in self.inputs:
+                raise ValueError(f"groups.{group}: an input has this name already")
+            for name in names:
+                if name not in self.inputs:
+                    raise ValueError(f"groups.{group}: {name!r} is not a sampled input")
+                if name in seen:
+                    raise ValueError(f"input {name!r} is in groups {seen[name]!r} and {group!r}")
+                seen[name] = group
+        return self
+
+
+class FactorReport(StudyTable):
+    """``[report]`` of such a study: outputs to rank, resamples of the intervals."""
+
+    outputs: Annotated[list[str], Field(min_length=1)] | None = None
+    resamples: Annotated[int, Field(ge=100, le=100_000)] = 1000
+
+
+class SaltelliDesign(StudyTable):
+    """``[design]`` of a Sobol' study: base points, doubled until the indices are known."""
+
+    n: Annotated[int, Field(ge=64, le=2**20)] = 1024
+    start: Annotated[int, Field(ge=64, le=2**20)] = 128
+    tolerance: Annotated[FiniteFloat, Field(gt=0.0)] | None = None
+    second_order: bool = False
+
+    @model_validator(mode="after")
+    def _powers(self) -> "SaltelliDesign":
+        for name in ("n", "start"):
+            value = getattr(self, name)
+            if value & (value - 1):
+                raise ValueError(f"{name} ({value}) must be a power of two")
+        return self
+
+
+class SobolStudy(FactorStudy):
+    """``kind = "sobol"``: how much of the variance of each output each factor explains."""
+
+    kind: Literal["sobol"]
+    design: SaltelliDesign = SaltelliDesign()
+    report: FactorReport = FactorReport()
+
+
+class MorrisDesign(StudyTable):
+    """``[design]`` of a Morris study: trajectories and levels of the grid."""
+
+    n: Annotated[int, Field(ge=FEWEST_BLOCKS, le=100_000)] = 50
+    levels: Annotated[int, Field(ge=4, le=20)] = 4
+
+    @model_validator(mode="after")
+    def _even(self) -> "MorrisDesign":
+        if self.levels % 2:
+            raise ValueError(f"levels ({self.levels}) must be even, or the grid is biased")
+        return self
+
+
+class MorrisStudy(FactorStudy):
+    """``kind = "morris"``: which of many factors matter at all."""
+
+    kind: Literal["morris"]
+    design: MorrisDesign = MorrisDesign()
+    report: FactorReport = FactorReport()
+
+
+Study = MonteCarloStudy | Reconstruction | SobolStudy | MorrisStudy
+SampledStudy = MonteCarloStudy | SobolStudy | MorrisStudy
+KINDS: tuple[str, ...] = tuple(
+    get_args(kind.model_fields["kind"].annotation)[0] for kind in get_args(Study)
+)
+"""What ``kind`` may be."""

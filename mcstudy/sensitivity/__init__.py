@@ -1,0 +1,1 @@
+"""Sensitivity: how much of an output's variance each input explains."""

@@ -1,0 +1,78 @@
+"""Sensitivity from any sample of inputs and outputs, whatever its design.
+
+All measures hold for dependent inputs, as measures of association: an input that only goes with
+another one gets that one's share as well. Dummies, independent of everything, draw the noise line
+of each measure.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcstudy import seeds
+from mcstudy.sensitivity.delta import delta
+from mcstudy.sensitivity.pawn import pawn
+from mcstudy.sensitivity.rank_based import rank_first_order
+
+Array = NDArray[np.float64]
+
+FEWEST_RUNS = 100
+"""Runs with a value below which the measures say nothing (assumed)."""
+DUMMIES = 20
+"""Dummies whose largest value draws the noise line: one input in twenty passes it by chance."""
+
+MEASURES: dict[str, Callable[[Array, Array, np.random.Generator], Array]] = {
+    "first_order": rank_first_order,
+    "delta": delta,
+    "pawn": pawn,
+}
+"""A new measure is one file and one line here: (n, d) inputs and (n,) outputs to (3, d)."""
+
+
+@dataclass(frozen=True)
+class GivenData:
+    """What the measures say of one output; NaN where it does not vary.
+
+    Attributes
+    ----------
+    values : by measure, (3, d) value, low and high of each input.
+    noise : by measure, the largest value among the dummies.
+    runs : with a value of the output.
+    """
+
+    values: dict[str, Array]
+    noise: dict[str, float]
+    runs: int
+
+
+def measure_given_data(values: Array, outputs: Array, seed: int) -> GivenData:
+    """Return all measures of the inputs of one output.
+
+    Parameters
+    ----------
+    values : (n, d), finite. outputs : (n,), NaN where there is none.
+    seed : of dummies and resamples.
+
+    Raises
+    ------
+    ValueError
+        If fewer than 100 runs have the output.
+    """
+    held = np.isfinite(outputs)
+    y = outputs[held]
+    if y.size < FEWEST_RUNS:
+        raise ValueError(f"{y.size} runs have a value, {FEWEST_RUNS} are needed")
+    rng = seeds.generator(seed, seeds.GIVEN_DATA)
+    x = np.column_stack([values[held], rng.random((y.size, DUMMIES))])
+    d = values.shape[1]
+    if np.ptp(y) == 0.0:
+        nothing = np.full((3, d), np.nan)
+        return GivenData(dict.fromkeys(MEASURES, nothing), dict.fromkeys(MEASURES, np.nan), y.size)
+    found = {name: measure(x, y, rng) for name, measure in MEASURES.items()}
+    return GivenData(
+        values={name: table[:, :d] for name, table in found.items()},
+        noise={name: float(table[0, d:].max()) for name, table in found.items()},
+        runs=int(y.size),
+    )

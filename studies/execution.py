@@ -1,0 +1,172 @@
+"""What every sampled study shares: its model, its runs in parallel, its manifest."""
+
+import os
+import platform
+import time
+from collections.abc import Mapping
+from importlib.metadata import version
+from typing import Any
+
+import joblib
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mcstudy import config, runner
+from mcstudy.config import FactorStudy, SampledStudy, Study
+from mcstudy.errors import UserError
+from mcstudy.failures import locate_failures
+from mcstudy.progress import Progress
+from mcstudy.results import ResultsFolder, check_failures, digest
+from mcstudy.sensitivity.blocks import FEWEST_BLOCKS
+from models.protocol import Model, complete_status
+from models.registry import load_model
+from studies import evaluation
+
+PACKAGES = ("numpy", "scipy", "numba", "pandas", "joblib", "pyarrow", "salib")
+
+
+def load_study_model(study: Study) -> Model:
+    """Return the model of a study.
+
+    Raises
+    ------
+    UserError
+        If the model or an option is unknown.
+    """
+    try:
+        return load_model(study.model.name, study.model.options)
+    except (ValueError, TypeError) as error:
+        raise UserError(f"model: {error}") from None
+
+
+def run_rows(
+    study: SampledStudy,
+    model: Model,
+    columns: Mapping[str, NDArray[np.float64]],
+    folder: ResultsFolder,
+    *,
+    design: Mapping[str, Any],
+    replicate: NDArray[np.int64],
+    workers: int,
+    quiet: bool,
+) -> pd.DataFrame:
+    """Run what is missing of a design, keep it, write the manifest and return all its runs.
+
+    Parameters
+    ----------
+    study, model : of the folder, which is open for writing.
+    columns : (n,) values of every input of the model.
+    design : what the manifest says of the design. replicate : (n,) of each row.
+    workers : processes, -1 for one a core. quiet : no progress line.
+
+    Raises
+    ------
+    StudyError
+        If too many runs failed, or the workers are lost.
+    """
+    rows = np.stack([columns[item.name] for item in model.inputs], axis=1)
+    task = runner.Task(
+        evaluate=evaluation.evaluate,
+        argument={
+            "name": study.model.name,
+            "options": study.model.options,
+            "version": model.version,
+        },
+        inputs=rows,
+        input_names=[item.name for item in model.inputs],
+        output_names=[item.name for item in model.outputs],
+        replicate=replicate,
+    )
+    complete = complete_status(model)
+    manifest = _manifest(study, model, config.numbers_digest(study, model), design, workers)
+    spent = folder.read_json("manifest.json") if (folder.path / "manifest.json").exists() else {}
+    manifest["wall_time_s"] = spent.get("wall_time_s", 0.0)
+    folder.write_json("manifest.json", manifest)
+    start = time.perf_counter()
+    with joblib.parallel_config(backend="loky", n_jobs=workers):
+        runs = runner.run(task, folder, Progress(quiet=quiet, complete=complete))
+    # A study that was larger before keeps its further runs.
+    folder.compact(held if (held := folder.done()) is not None else runs)
+    counts = {str(k): int(v) for k, v in runs["status"].value_counts().items()}
+    manifest |= {
+        "wall_time_s": round(manifest["wall_time_s"] + time.perf_counter() - start, 3),
+        "counts": counts,
+        "digest": digest(runs),
+        "finished": True,
+    }
+    folder.write_json("manifest.json", manifest)
+    check_failures(counts, set(counts) - complete, study.max_failure_rate)
+    return runs
+
+
+def whole_prefix(folder: ResultsFolder, design: Mapping[str, Any]) -> pd.DataFrame:
+    """Return the first runs of a design in blocks, up to the first block with a missing run.
+
+    Parameters
+    ----------
+    folder : ResultsFolder
+    design : of its manifest, with ``n`` runs in blocks of ``block``.
+
+    Raises
+    ------
+    UserError
+        If not even the first blocks are there.
+    """
+    runs = folder.runs()
+    runs = runs[runs["run"] < int(design["n"])]
+    block = int(design["block"])
+    ids = runs["run"].to_numpy()
+    gaps = np.flatnonzero(ids != np.arange(ids.size))
+    blocks = (int(gaps[0]) if gaps.size else ids.size) // block
+    if blocks < FEWEST_BLOCKS:
+        raise UserError(f"{folder.path}: too few runs are done for a report; run the study again")
+    return runs.iloc[: blocks * block]
+
+
+def judge_runs(
+    study: FactorStudy, model: Model, runs: pd.DataFrame, block: int
+) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+    """Return what an analysis in blocks begins with, and (n,) which runs are complete.
+
+    Raises
+    ------
+    StudyError
+        If more runs failed than the study allows.
+    """
+    complete: NDArray[np.bool_] = runs["status"].isin(complete_status(model)).to_numpy(dtype=bool)
+    counts = {str(k): int(v) for k, v in runs["status"].value_counts().items()}
+    check_failures(counts, set(counts) - complete_status(model), study.max_failure_rate)
+    begun = {
+        "kind": study.kind,
+        "runs": len(runs),
+        "status": counts,
+        "groups": {name: list(names) for name, names in study.groups.items()},
+        "failures": locate_failures(runs[list(study.inputs)], ~complete, block),
+    }
+    return begun, complete
+
+
+def _manifest(
+    study: SampledStudy,
+    model: Model,
+    topics: Mapping[str, str],
+    design: Mapping[str, Any],
+    workers: int,
+) -> dict[str, Any]:
+    return {
+        "format": "mcstudy-results/1",
+        "study": study.name,
+        "kind": study.kind,
+        "seed": study.seed,
+        "model": {"name": model.name, "version": model.version, "options": study.model.options},
+        "design": dict(design),
+        "numbers": dict(topics),
+        "hash": config.hash_of(dict(topics)),
+        "versions": {"mcstudy": version("mcstudy"), "python": platform.python_version()}
+        | {name: version(name) for name in PACKAGES},
+        "machine": {"system": platform.system(), "processor": platform.machine(),
+                    "cores": os.cpu_count()},
+        "workers": workers,
+        "finished": False,
+    }  # fmt: skip

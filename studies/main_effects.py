@@ -1,0 +1,37 @@
+"""Main effects of a study's inputs, in the units of its file."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mcstudy import units
+from mcstudy.config import SampledStudy
+from mcstudy.sensitivity.main_effects import main_effect
+from models.protocol import Model
+
+
+def main_effects_of(
+    study: SampledStudy, model: Model, runs: pd.DataFrame, output: str
+) -> dict[str, Any]:
+    """Return what an output does on average along each sampled input.
+
+    Parameters
+    ----------
+    study, model : of the runs.
+    runs : independently drawn. output : name.
+
+    Returns
+    -------
+    dict
+        By input ``unit`` and what ``main_effect`` gives.
+    """
+    values: NDArray[np.float64] = runs[output].to_numpy(dtype=float)
+    model_unit = {item.name: item.unit for item in model.inputs}
+    effects = {}
+    for name, entry in study.inputs.items():
+        scale = 1.0 / units.factor(entry.unit, model_unit[name])
+        inputs = scale * runs[name].to_numpy(dtype=float)
+        effects[name] = {"unit": entry.unit} | main_effect(inputs, values)
+    return effects

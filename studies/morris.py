@@ -1,0 +1,145 @@
+"""The Morris study: which of many factors matter at all, for a few dozen runs each."""
+
+from typing import Any
+
+import pandas as pd
+
+from mcstudy import config
+from mcstudy.config import MorrisStudy, load_study
+from mcstudy.errors import StudyError, UserError
+from mcstudy.figures import style
+from mcstudy.report import render
+from mcstudy.results import ResultsFolder
+from mcstudy.sensitivity.blocks import is_enough, whole_blocks
+from mcstudy.sensitivity.morris import ElementaryEffects, draw_trajectories, estimate_effects
+from models.protocol import Model
+from studies.execution import judge_runs, load_study_model, run_rows, whole_prefix
+from studies.morris_report import draw, sections_of
+
+
+def run_morris(
+    study: MorrisStudy,
+    text: str,
+    folder: ResultsFolder,
+    *,
+    workers: int = -1,
+    quiet: bool = False,
+) -> dict[str, Any]:
+    """Run a Morris study, or go on with it, and write its results folder.
+
+    Parameters
+    ----------
+    study : MorrisStudy
+    text : the study file as written. folder : ResultsFolder
+    workers : processes, -1 for one a core. quiet : no progress line.
+
+    Returns
+    -------
+    dict
+        The analysis, as in ``analysis.json``.
+
+    Raises
+    ------
+    UserError
+        If the study does not fit the model or the folder, or its inputs are dependent.
+    StudyError
+        If too many runs failed.
+    """
+    model = load_study_model(study)
+    config.report_outputs(study, model)
+    config.check_independent(study)
+    design = study.design
+    drawn = draw_trajectories(list(study.inputs), study.groups, design.n, design.levels, study.seed)
+    columns = config.map_inputs(study, model, drawn.uniforms)
+    folder.check_same_study(config.numbers_digest(study, model))
+    with folder.open_for_writing():
+        folder.write_text("study.toml", text)
+        run_rows(
+            study, model, columns, folder,
+            design={"method": "morris", "n": len(drawn.levels), "block": drawn.block,
+                    "trajectories": design.n},
+            replicate=drawn.trajectory, workers=workers, quiet=quiet,
+        )  # fmt: skip
+        return build_report(folder)
+
+
+def build_report(folder: ResultsFolder) -> dict[str, Any]:
+    """Analyse a results folder and write its figures and report, without running the model.
+
+    Raises
+    ------
+    UserError
+        If the folder is not one of a Morris study, or holds too few runs yet.
+    StudyError
+        If failed runs leave too few trajectories.
+    """
+    study = load_study(folder.path / "study.toml")
+    if not isinstance(study, MorrisStudy):
+        raise UserError(f"{folder.path}: is not the folder of a Morris study")
+    model = load_study_model(study)
+    manifest = folder.read_json("manifest.json")
+    runs = whole_prefix(folder, manifest["design"])
+    folder.write_json("analysis.json", analyse(study, model, runs))
+    analysis = folder.read_json("analysis.json")
+    figures = draw(analysis)
+    style.save(figures, folder.path / "figures")
+    subtitle = (
+        f"Morris screening by {len(runs):,} runs of the {model.name} model: "
+        f"{analysis['trajectories']:,} trajectories, seed {study.seed}"
+    )
+    folder.write_text(
+        "report.html", render(study.title, subtitle, sections_of(study, model, analysis, figures))
+    )
+    return analysis
+
+
+def analyse(study: MorrisStudy, model: Model, runs: pd.DataFrame) -> dict[str, Any]:
+    """Return every number that the report prints.
+
+    Raises
+    ------
+    StudyError
+        If more runs failed than the study allows, or no reported output can be ranked.
+    """
+    inputs = list(study.inputs)
+    drawn = draw_trajectories(inputs, study.groups, study.design.n, study.design.levels, study.seed)
+    analysis, complete = judge_runs(study, model, runs, drawn.block)
+    names = [item.name for item in model.outputs]
+    cube, kept = whole_blocks(runs[names].to_numpy(dtype=float), complete, drawn.block)
+    levels = drawn.levels[: len(runs)].reshape(len(cube), drawn.block, -1)
+    analysis |= {"trajectories": len(cube), "factors": list(drawn.factors), "outputs": {}}
+    for column, item in enumerate(model.outputs):
+        held = kept[:, column]
+        entry: dict[str, Any] = {"unit": item.unit, "trajectories": int(held.sum())}
+        if is_enough(held):
+            found = estimate_effects(
+                inputs, study.groups, levels[held].reshape(-1, len(inputs) + 1),
+                cube[held, :, column].ravel(), study.design.levels,
+                resamples=study.report.resamples, seed=study.seed,
+            )  # fmt: skip
+            entry["factors"] = _by_factor(found, drawn.factors)
+        analysis["outputs"][item.name] = entry
+    wanted = config.report_outputs(study, model)
+    analysis["ranked"] = [name for name in wanted if "factors" in analysis["outputs"][name]]
+    if not analysis["ranked"]:
+        raise StudyError(
+            f"{', '.join(wanted)}: too few of the {len(cube)} trajectories have no failed run and "
+            "a value in every row; nothing is ranked"
+        )
+    return analysis
+
+
+def _by_factor(found: ElementaryEffects, factors: tuple[str, ...]) -> dict[str, dict[str, Any]]:
+    table = zip(factors, found.mean, found.mean_size.T, found.spread, strict=True)
+    return {
+        name: {
+            "mean": float(mean),
+            "value": float(size[0]),
+            "low": float(size[1]),
+            "high": float(size[2]),
+            "spread": float(spread),
+            # The last factor is the dummy.
+            "clear": bool(size[1] > found.mean_size[2, -1]),
+        }
+        for name, mean, size, spread in table
+    }

@@ -1,0 +1,135 @@
+"""The report of a Morris study: which factors matter, in words, tables and pictures."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from mcstudy.config import MorrisStudy
+from mcstudy.figures import screening, style
+from mcstudy.report import Section, Table
+from mcstudy.sensitivity.factors import DUMMY, NUDGE
+from mcstudy.sensitivity.morris import TAIL
+from mcstudy.text import interval, number, unit
+from models.protocol import Model
+from studies.factor_report import groups_said
+from studies.failure_report import failure_map, failures_said, status_table
+
+NAMED = 4
+"""Factors that a sentence names, the largest."""
+CURVED = 0.5
+"""Scatter of the elementary effects, as a share of their mean size, above which a factor counts as
+acting through curvature or interactions (assumed)."""
+
+
+def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the study's figures by file name."""
+    ranked = {name: analysis["outputs"][name] for name in analysis["ranked"]}
+    return failure_map(analysis) | {
+        "mean_effects": screening.draw_mean_effects(ranked, DUMMY),
+        "elementary_effects": screening.draw_elementary_effects(ranked),
+    }
+
+
+def sections_of(
+    study: MorrisStudy, model: Model, analysis: Mapping[str, Any], figures: Mapping[str, Any]
+) -> list[Section]:
+    """Return the sections of the report."""
+    reach = f"from the {100 * TAIL:g} % to the {100 - 100 * TAIL:g} % point of a factor"
+    return [
+        Section(
+            "Which factors matter",
+            [*summarise(analysis), *_not_ranked(analysis)],
+            [_table(name, analysis["outputs"][name]) for name in analysis["ranked"]],
+            {
+                f"Mean size of the elementary effects (μ*), {reach}, with 95 % intervals. Factors "
+                "that do not pass the noise line are not distinguishable from none.":
+                figures["mean_effects"],
+                "Scatter of the elementary effects (σ) over their mean size: at the bottom "
+                "factors that act alike everywhere, towards the upper left those whose effect "
+                "depends on the other factors or on where they stand. Groups have no σ.":
+                figures["elementary_effects"],
+            },
+        ),
+        Section(
+            "How sure the numbers are",
+            [
+                f"Each of {analysis['trajectories']:,} trajectories changes one factor after the "
+                f"other by one large step between {study.design.levels} levels. The dummy nudges "
+                f"every input by {NUDGE:g} of its range: its effect is the model's noise floor. "
+                f"Intervals are 95 %, by {study.report.resamples:,} bootstrap resamples of "
+                "trajectories. A Morris study ranks factors; shares of variance take a Sobol' "
+                "study of those that matter.",
+                *failures_said(analysis),
+            ],
+            [status_table(analysis)],
+            {"Share of failed runs in each tenth of each input.": figures["failures"]}
+            if "failures" in figures
+            else {},
+        ),
+        Section("The model", (f"Model {model.name}, version {model.version}.",
+                              groups_said(analysis))),
+    ]  # fmt: skip
+
+
+def summarise(analysis: Mapping[str, Any]) -> list[str]:
+    """Return what matters for the reported outputs, a paragraph each."""
+    return [sentence(name, analysis["outputs"][name]) for name in analysis["ranked"]]
+
+
+def sentence(name: str, entry: Mapping[str, Any]) -> str:
+    """Say in words which factors move an output."""
+    factors = dict(entry["factors"])
+    noise = factors.pop(DUMMY)
+    order = sorted(factors, key=lambda f: -factors[f]["value"])
+    clear = [f for f in order if factors[f]["clear"]]
+    suffix = f" {unit(entry['unit'])}".rstrip()
+    title = style.words(name)
+    if not clear:
+        return f"{title[0].upper() + title[1:]}: no factor stands out of the noise."
+    named = ", ".join(
+        f"{style.words(f)} ({number(factors[f]['value'])} ± "
+        f"{number(factors[f]['value'] - factors[f]['low'], 2)}{suffix})"
+        for f in clear[:NAMED]
+    )
+    lines = [f"{title[0].upper() + title[1:]} is moved most by {named}."]
+    curved = [
+        f for f in clear[:NAMED] if (factors[f]["spread"] or 0.0) > CURVED * factors[f]["value"]
+    ]
+    if curved:
+        lines.append(
+            "Of these, curvature or interactions with other factors show in "
+            f"{', '.join(style.words(f) for f in curved)}."
+        )
+    weak = [f for f in order if f not in clear]
+    if weak:
+        lines.append(f"Not distinguishable from noise: {', '.join(style.words(f) for f in weak)}.")
+    lines.append(f"Noise floor: {number(noise['value'], 2)}{suffix}.")
+    return " ".join(lines)
+
+
+def _not_ranked(analysis: Mapping[str, Any]) -> list[str]:
+    missing = [
+        f"{style.words(name)} ({entry['trajectories']:,} of {analysis['trajectories']:,})"
+        for name, entry in analysis["outputs"].items()
+        if "factors" not in entry
+    ]
+    if not missing:
+        return []
+    return [
+        "Not ranked, because too few trajectories have a value in every row (no failed run, and a "
+        f"contact that the output is about): {', '.join(missing)}."
+    ]
+
+
+def _table(name: str, entry: Mapping[str, Any]) -> Table:
+    factors = entry["factors"]
+    order = sorted(factors, key=lambda f: -factors[f]["value"])
+    rows = [
+        [style.words(f), interval(factors[f]), number(factors[f]["mean"]),
+         number(factors[f]["spread"])]
+        for f in order
+    ]  # fmt: skip
+    caption = (
+        f"{style.words(name)} [{unit(entry['unit']) or '–'}]: elementary effects over "
+        f"{entry['trajectories']:,} trajectories."
+    )
+    return Table(caption, ["factor", "μ* (95 %)", "μ", "σ"], rows)

@@ -1,0 +1,131 @@
+"""Sensitivity from the runs of any results folder, whatever the study's design was."""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from mcstudy import config
+from mcstudy.config import MonteCarloStudy, MorrisStudy, SobolStudy, load_study
+from mcstudy.errors import UserError
+from mcstudy.figures import style
+from mcstudy.progress import follow
+from mcstudy.report import render
+from mcstudy.results import ResultsFolder
+from mcstudy.sensitivity.given_data import measure_given_data
+from models.protocol import complete_status
+from studies.execution import load_study_model
+from studies.main_effects import main_effects_of
+from studies.sensitivity_report import draw, sections_of
+
+
+def measure_sensitivity(
+    source: ResultsFolder,
+    out: ResultsFolder | None = None,
+    *,
+    outputs: Sequence[str] = (),
+    quiet: bool = False,
+) -> dict[str, Any]:
+    """Measure what drives the outputs of a results folder and write a report of it.
+
+    Parameters
+    ----------
+    source : folder of a Monte Carlo or Sobol' study.
+    out : where the report goes, by default ``sensitivity`` in the folder.
+    outputs : names, by default those that the study reports.
+    quiet : no progress line.
+
+    Returns
+    -------
+    dict
+        The analysis, as in ``analysis.json``.
+
+    Raises
+    ------
+    UserError
+        If the folder's design is no sample of the inputs, an output is unknown, or too few runs
+        have a value.
+    """
+    study = load_study(source.path / "study.toml")
+    if isinstance(study, MorrisStudy):
+        raise UserError(
+            f"{source.path}: trajectories of a Morris study are no sample of its inputs; its own "
+            "report ranks them"
+        )
+    if not isinstance(study, MonteCarloStudy | SobolStudy):
+        raise UserError(f"{source.path}: a {study.kind} has no sampled inputs")
+    folder = out or ResultsFolder(Path(source.path) / "sensitivity")
+    if folder.path.resolve() == source.path.resolve():
+        raise UserError(f"{folder.path}: holds the study itself; choose another --out")
+    model = load_study_model(study)
+    if outputs:
+        config.check_outputs(outputs, model, "--output")
+    wanted = list(outputs or config.report_outputs(study, model))
+    runs = _independent(source, source.runs())
+    complete = runs[runs["status"].isin(complete_status(model))]
+    inputs = list(study.inputs)
+    analysis: dict[str, Any] = {
+        "source": str(source.path),
+        "kind": study.kind,
+        "title": study.title,
+        "runs": len(complete),
+        "dependent": _dependent(study),
+        "outputs": {},
+        "main_effects": {},
+    }
+    values = complete[inputs].to_numpy(dtype=float)
+    unit_of = {item.name: item.unit for item in model.outputs}
+    for name in follow(wanted, "outputs", quiet=quiet):
+        column = complete[name].to_numpy(dtype=float)
+        try:
+            found = measure_given_data(values, column, study.seed)
+        except ValueError as error:
+            raise UserError(f"{source.path}: {name}: {error}") from None
+        measures = {
+            measure: {
+                "noise": found.noise[measure],
+                "inputs": {
+                    key: {
+                        "value": float(table[0, k]),
+                        "low": float(table[1, k]),
+                        "high": float(table[2, k]),
+                        "clear": bool(table[0, k] > found.noise[measure]),
+                    }
+                    for k, key in enumerate(inputs)
+                },
+            }
+            for measure, table in found.values.items()
+        }
+        analysis["outputs"][name] = {
+            "unit": unit_of[name], "runs": found.runs, "measures": measures
+        }  # fmt: skip
+        analysis["main_effects"][name] = main_effects_of(study, model, complete, name)
+    with folder.open_for_writing():
+        folder.write_json("analysis.json", analysis)
+        analysis = folder.read_json("analysis.json")
+        figures = draw(analysis)
+        style.save(figures, folder.path / "figures")
+        subtitle = f"Sensitivity from {len(complete):,} runs of the {study.kind} study {study.name}"
+        folder.write_text(
+            "report.html", render(study.title, subtitle, sections_of(analysis, figures))
+        )
+    return analysis
+
+
+def _independent(source: ResultsFolder, runs: pd.DataFrame) -> pd.DataFrame:
+    """Return the runs that were drawn independently: of Saltelli's blocks the rows of A and B."""
+    design = source.read_json("manifest.json").get("design", {})
+    block = int(design.get("block", 1))
+    if block == 1:
+        return runs
+    place = runs["run"] % block
+    return runs[(place == 0) | (place == block - 1)]
+
+
+def _dependent(study: MonteCarloStudy | SobolStudy) -> list[str]:
+    """Return the inputs that depend on others."""
+    pairs: Iterable[tuple[str, str]] = [(a, b) for a, b, _ in study.dependence.correlations] + [
+        (name, parent) for name, entry in study.inputs.items() for parent in entry.parents
+    ]
+    return sorted({name for pair in pairs for name in pair})

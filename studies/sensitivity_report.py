@@ -1,0 +1,131 @@
+"""The report of given-data sensitivity: what goes with an output, by three measures."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from mcstudy.figures import screening, sensitivity, style
+from mcstudy.report import Section, Table
+from mcstudy.sensitivity.given_data import DUMMIES
+from mcstudy.text import number, share
+
+TITLES = {
+    "first_order": "first-order index, rank based [–]",
+    "delta": "Borgonovo's delta [–]",
+    "pawn": "PAWN, median over slices [–]",
+}
+NAMED = 4
+"""Inputs that a sentence names, the largest."""
+
+
+def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the figures by file name."""
+    figures = {}
+    for name, entry in analysis["outputs"].items():
+        if not _varies(entry):
+            continue
+        figures[f"measures_{name}"] = screening.draw_given_data(entry["measures"], TITLES)
+        figures[f"main_effects_{name}"] = sensitivity.draw_main_effects(
+            analysis["main_effects"][name],
+            style.label(name, entry["unit"]),
+        )
+    return figures
+
+
+def sections_of(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list[Section]:
+    """Return the sections of the report."""
+    sections = []
+    for name, entry in analysis["outputs"].items():
+        words = style.words(name)
+        heading, said = words[0].upper() + words[1:], [sentence(name, entry)]
+        if not _varies(entry):
+            sections.append(Section(heading, said))
+            continue
+        shown = {
+            f"What goes with {words}: 95 % intervals for the first-order index, bootstrap scatter "
+            "for delta, smallest and largest slice for PAWN. Grey: not above the noise line.":
+            figures[f"measures_{name}"],
+            f"Conditional mean and band of {words}.": figures[f"main_effects_{name}"],
+        }  # fmt: skip
+        sections.append(Section(heading, said, [_table(name, entry)], shown))
+    return [*sections, Section("How to read the numbers", _explained(analysis))]
+
+
+def summarise(analysis: Mapping[str, Any]) -> list[str]:
+    """Return what goes with the outputs, a paragraph each."""
+    return [sentence(name, entry) for name, entry in analysis["outputs"].items()]
+
+
+def sentence(name: str, entry: Mapping[str, Any]) -> str:
+    """Say in words which inputs go with an output."""
+    words = style.words(name)
+    if not _varies(entry):
+        return f"{words[0].upper() + words[1:]} does not vary."
+    first = entry["measures"]["first_order"]["inputs"]
+    order = sorted(first, key=lambda key: -first[key]["value"])
+    clear = [key for key in order if first[key]["clear"]]
+    if clear:
+        named = ", ".join(
+            f"{style.words(key)} {100.0 * first[key]['value']:.0f} ± "
+            f"{max(1.0, 50.0 * (first[key]['high'] - first[key]['low'])):.0f} %"
+            for key in clear[:NAMED]
+        )
+        text = f"Some of the variance of {words} goes with single inputs: {named}."
+    else:
+        text = f"No single input stands out in the mean of {words}."
+    others = [
+        key
+        for key in order
+        if key not in clear
+        and any(entry["measures"][m]["inputs"][key]["clear"] for m in ("delta", "pawn"))
+    ]
+    if others:
+        text += (
+            f" Its distribution moves with {', '.join(map(style.words, others))} as well, though "
+            "no share of the variance is clear."
+        )
+    none = [
+        key
+        for key in order
+        if not any(table["inputs"][key]["clear"] for table in entry["measures"].values())
+    ]
+    if none:
+        text += f" Not distinguishable from none: {', '.join(map(style.words, none))}."
+    return text
+
+
+def _varies(entry: Mapping[str, Any]) -> bool:
+    return entry["measures"]["first_order"]["noise"] is not None
+
+
+def _table(name: str, entry: Mapping[str, Any]) -> Table:
+    measures = entry["measures"]
+    first = measures["first_order"]["inputs"]
+    order = sorted(first, key=lambda key: -(first[key]["value"] or 0.0))
+    rows = [
+        [style.words(key), *(share(table["inputs"][key]) for table in measures.values())]
+        for key in order
+    ]
+    rows.append(["noise line", *(number(table["noise"], 2) for table in measures.values())])
+    head = ["input", *(TITLES[measure].removesuffix(" [–]") for measure in measures)]
+    return Table(f"{style.words(name)}: {entry['runs']:,} runs with a value.", head, rows)
+
+
+def _explained(analysis: Mapping[str, Any]) -> list[str]:
+    lines = [
+        "First-order index, rank based: the share of the variance that goes with the input alone. "
+        "Delta: the share of the whole density that moves when the input is known. PAWN: the "
+        "distance that the cumulative distribution moves. The last two also see effects on the "
+        "spread or shape that leave the mean alone, and they are never negative: their noise line "
+        "is above zero.",
+        f"The noise line is the largest value of {DUMMIES} dummies that have nothing to do with "
+        "the output: one unrelated input in twenty passes it by chance.",
+        "None of them sees an input that acts through interactions alone; total indices take a "
+        "Sobol' study.",
+    ]
+    if analysis["dependent"]:
+        lines.append(
+            f"{', '.join(map(style.words, analysis['dependent']))} depend on each other: what one "
+            "of them does shows with the others as well. The numbers are associations, and they "
+            "do not add up."
+        )
+    return lines

@@ -1,0 +1,257 @@
+"""The report of a Sobol' study: what its indices say, in words, tables and pictures."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from mcstudy.config import SobolStudy
+from mcstudy.figures import sensitivity, style
+from mcstudy.report import Section, Table
+from mcstudy.sensitivity.factors import DUMMY, NUDGE
+from mcstudy.sensitivity.saltelli import SCRAMBLES
+from mcstudy.text import quantity, share
+from models.protocol import Model
+from studies.factor_report import groups_said
+from studies.failure_report import failure_map, failures_said, status_table
+
+NAMED = 4
+"""Factors that a sentence names, the largest."""
+
+
+def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the study's figures by file name."""
+    outputs = analysis["outputs"]
+    varying = [name for name in analysis["convergence"] if outputs[name]["variance"]]
+    figures: dict[str, Any] = failure_map(analysis)
+    if not varying:
+        return figures
+    figures |= {
+        "indices": sensitivity.draw_indices({name: outputs[name] for name in varying}, DUMMY),
+        "heatmap": sensitivity.draw_heatmap(
+            {name: entry for name, entry in outputs.items() if entry.get("variance")}
+        ),
+        "convergence": sensitivity.draw_convergence(
+            {name: analysis["convergence"][name] for name in varying}
+        ),
+    }
+    for name in varying:
+        figures[f"main_effects_{name}"] = sensitivity.draw_main_effects(
+            analysis["main_effects"][name],
+            style.label(name, outputs[name]["unit"]),
+        )
+        if "second" in outputs[name]:
+            figures[f"second_order_{name}"] = sensitivity.draw_second_order(
+                outputs[name], analysis["factors"], style.words(name)
+            )
+    return figures
+
+
+def sections_of(
+    study: SobolStudy, model: Model, analysis: Mapping[str, Any], figures: Mapping[str, Any]
+) -> list[Section]:
+    """Return the sections of the report."""
+    wanted = list(analysis["convergence"])
+    outputs = analysis["outputs"]
+
+    def picked(prefix: str, caption: str) -> dict[str, Any]:
+        return {
+            f"{caption} {style.words(name)}.": figures[f"{prefix}_{name}"]
+            for name in wanted
+            if f"{prefix}_{name}" in figures
+        }
+
+    def one(name: str, caption: str) -> dict[str, Any]:
+        return {caption: figures[name]} if name in figures else {}
+
+    sections = [
+        Section(
+            "What drives the outputs",
+            summarise(analysis),
+            [_index_table(name, outputs[name]) for name in wanted],
+            one("indices", "First-order and total indices with 95 % intervals. Factors whose total "
+                "index does not pass the noise line are not distinguishable from none."),
+        ),
+        Section(
+            "All outputs",
+            ["Total indices: the share of an output's variance that would be left if all but this "
+             "factor were known.", *_not_given(analysis)],
+            (),
+            one("heatmap", "Total index of every output by factor."),
+        ),
+        Section(
+            "Main effects",
+            ("What an output does on average as one input goes through its distribution, and the "
+             "spread that the others leave.",),
+            (),
+            picked("main_effects", "Conditional mean and band of"),
+        ),
+    ]  # fmt: skip
+    second = picked("second_order", "Second-order indices of")
+    if second:
+        sections.append(
+            Section("Interactions of two", ("Grey: not distinguishable from zero.",), (), second)
+        )
+    return [
+        *sections,
+        Section(
+            "The model's noise floor",
+            (f"The dummy nudges every input by {NUDGE:g} of its range. An output that follows its "
+             "inputs does not feel that; what it does to a chaotic one, no input explains, however "
+             "well it is known.",),
+            [_noise_table(analysis)],
+        ),
+        Section(
+            "How sure the numbers are",
+            [_convergence_said(analysis), _intervals_said(study), *failures_said(analysis)],
+            [status_table(analysis)],
+            one("convergence", "Total indices on growing parts of the design, with 95 % bands; the "
+                "largest factors.")
+            | one("failures", "Share of failed runs in each tenth of each input."),
+        ),
+        Section("The model", (f"Model {model.name}, version {model.version}.",
+                              groups_said(analysis))),
+    ]  # fmt: skip
+
+
+def summarise(analysis: Mapping[str, Any]) -> list[str]:
+    """Return what drives the reported outputs, a paragraph each."""
+    return [sentence(name, analysis["outputs"][name]) for name in analysis["convergence"]]
+
+
+def sentence(name: str, entry: Mapping[str, Any]) -> str:
+    """Say in words what drives an output."""
+    title = style.words(name)
+    if not entry["variance"]:
+        return f"{title[0].upper() + title[1:]} does not vary."
+    first, total = entry["first"], entry["total"]
+    noise = total[DUMMY]
+    factors = [factor for factor in total if factor != DUMMY]
+    order = sorted(factors, key=lambda factor: -first[factor]["value"])
+    clear = [factor for factor in order if first[factor]["low"] > 0.0]
+    lines = []
+    if clear:
+        named = ", ".join(f"{style.words(f)} {_share(first[f])}" for f in clear[1:NAMED])
+        lines.append(
+            f"{style.words(clear[0])} explains {_share(first[clear[0]])} of the variance of {title}"
+            + (f", {named}." if named else ".")
+        )
+    else:
+        lines.append(f"no factor on its own explains a share of the variance of {title} that is "
+                     "clear of zero.")  # fmt: skip
+    alone = entry["alone"]
+    lines.append(
+        f"All factors on their own explain {_share(alone)}; "
+        + (
+            "the rest are interactions" + (" and chaos." if noise["value"] > 0.01 else ".")
+            if alone["high"] < 1.0 - noise["high"]
+            else "interactions are not distinguishable from none."
+        )
+    )
+    # What chaos does shows in every total index.
+    felt = [f for f in factors if total[f]["low"] > noise["high"]]
+    mixed = [f for f in felt if total[f]["low"] > first[f]["high"] + noise["high"]]
+    mixed.sort(key=lambda f: first[f]["value"] - total[f]["value"])
+    if mixed:
+        named = ", ".join(
+            f"{style.words(f)} ({_percent(first[f])} alone, {_percent(total[f])} with interactions)"
+            for f in mixed[:NAMED]
+        )
+        lines.append(f"Most through interactions: {named}.")
+    quiet = [f for f in felt if f not in clear and f not in mixed[:NAMED]]
+    if quiet:
+        lines.append(
+            "Clear of zero only with their interactions: "
+            f"{', '.join(style.words(f) for f in quiet)}."
+        )
+    weak = [f for f in factors if f not in felt and f not in clear]
+    if weak:
+        lines.append(
+            "Not distinguishable from zero, even with interactions: "
+            f"{', '.join(style.words(f) for f in weak)}."
+        )
+    lines.append(
+        f"{_share(noise)} of the variance belongs to no input: a nudge of all inputs by "
+        f"{NUDGE:g} of their range makes {title} scatter by {_quantity(entry['noise_sd'], entry)} "
+        "(standard deviation)."
+    )
+    return " ".join(line[0].upper() + line[1:] for line in lines)
+
+
+def _share(entry: Mapping[str, float]) -> str:
+    value, half = 100.0 * entry["value"], 50.0 * (entry["high"] - entry["low"])
+    if abs(value) < 0.5 and half < 0.5:
+        return "less than 1 %"
+    return f"{_percent(entry, ' ')}± {max(half, 1.0):.0f} %"
+
+
+def _percent(entry: Mapping[str, float], unit: str = " %") -> str:
+    # Below zero estimates are noise about it.
+    return f"{max(0, round(100.0 * entry['value']))}{unit}"
+
+
+def _quantity(value: float, entry: Mapping[str, Any]) -> str:
+    return quantity(value, entry["unit"], 2)
+
+
+def _index_table(name: str, entry: Mapping[str, Any]) -> Table:
+    order = sorted(entry["total"], key=lambda f: -(entry["total"][f]["value"] or 0.0))
+    rows = [[style.words(f), share(entry["first"][f]), share(entry["total"][f])] for f in order]
+    caption = (
+        f"{style.words(name)}: standard deviation {_quantity(entry['variance'] ** 0.5, entry)}, "
+        f"{entry['base_points']:,} base points. Negative estimates are noise about zero."
+    )
+    return Table(caption, ["factor", "first order (95 %)", "total (95 %)"], rows)
+
+
+def _not_given(analysis: Mapping[str, Any]) -> list[str]:
+    missing = [
+        f"{style.words(name)} ({entry['base_points']:,} of {analysis['base_points']:,})"
+        for name, entry in analysis["outputs"].items()
+        if "total" not in entry
+    ]
+    if not missing:
+        return []
+    return [
+        "No index is given where too few base points have a value in every row (no failed run, "
+        f"and a contact that the output is about): {', '.join(missing)}."
+    ]
+
+
+def _noise_table(analysis: Mapping[str, Any]) -> Table:
+    rows = []
+    for name, entry in analysis["outputs"].items():
+        if entry.get("variance"):
+            dummy = entry["total"][DUMMY]
+            rows.append(
+                [
+                    style.words(name),
+                    _quantity(entry["variance"] ** 0.5, entry),
+                    _quantity(entry["noise_sd"], entry),
+                    f"{100.0 * dummy['value']:.2g} %",
+                ]
+            )
+    head = ["output", "standard deviation", "of it the noise floor", "share of the variance"]
+    return Table("What no input explains, by output.", head, rows)
+
+
+def _convergence_said(analysis: Mapping[str, Any]) -> str:
+    if analysis["widest"] is None:
+        return "Some intervals could not be estimated: an output hardly ever changes."
+    said = (
+        f"The widest 95 % interval of a total index of the reported outputs is "
+        f"{analysis['widest']:.3f} wide, with a design of {analysis['base_points']:,} base points."
+    )
+    tolerance = analysis["tolerance"]
+    if tolerance is None:
+        return said
+    if analysis["widest"] <= tolerance:
+        return f"{said} The study asked for {tolerance:g}: met."
+    return f"{said} The study asked for {tolerance:g}: NOT met, the budget is spent."
+
+
+def _intervals_said(study: SobolStudy) -> str:
+    return (
+        f"The design is {SCRAMBLES} independent scrambles of a Sobol' sequence. Intervals are 95 % "
+        f"t intervals with the standard deviation of {study.report.resamples:,} bootstrap "
+        "resamples of whole scrambles. They count the sampling error only, not what the model "
+        "itself gets wrong."
+    )

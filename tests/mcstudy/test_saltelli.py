@@ -1,0 +1,216 @@
+"""Saltelli's design: what is exchanged, what a larger design keeps, what the dummy feels."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from numpy.typing import NDArray
+from scipy import special
+
+from mcstudy.sensitivity.factors import DUMMY, NUDGE, factors_of, nudged
+from mcstudy.sensitivity.saltelli import SCRAMBLES, Saltelli, block_size, draw_saltelli
+from mcstudy.sensitivity.sobol import Indices, estimate_indices, split_blocks
+
+Array = NDArray[np.float64]
+
+QUIET = settings(derandomize=True, deadline=None, database=None, max_examples=50)
+INPUTS = ("a", "b", "c", "d", "e")
+GROUPS = {"pair": ["b", "d"]}
+
+
+def blocks_of(design: Saltelli) -> Array:
+    """Return the design by block, (n, block, d)."""
+    return design.uniforms.reshape(-1, design.block, design.uniforms.shape[1])
+
+
+def indices_of(design: Saltelli, outputs: Array) -> Indices:
+    """Return the indices of one output of a first-order design."""
+    blocks = split_blocks(outputs[:, None], len(design.factors), second_order=False)
+    return estimate_indices(blocks, design.scramble[:: design.block], resamples=0)
+
+
+# -- layout ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("second_order", "block"), [(False, 7), (True, 12)])
+def test_a_design_has_a_block_a_base_point(second_order: bool, block: int) -> None:
+    # Saltelli 2002: d + 2 rows a base point for first and total, 2 d + 2 for second order.
+    design = draw_saltelli(INPUTS, GROUPS, 64, 3, second_order=second_order)
+    assert design.factors == ("a", "pair", "c", "e", DUMMY)
+    assert design.block == block_size(design.factors, second_order=second_order) == block
+    assert design.uniforms.shape == (64 * block, 5)
+    scrambles = design.scramble.reshape(64, block)
+    np.testing.assert_array_equal(scrambles, np.tile(np.arange(64) % 16, (block, 1)).T)
+
+
+def test_without_groups_every_input_is_a_factor() -> None:
+    assert factors_of(INPUTS, {}) == (*INPUTS, DUMMY)
+    assert factors_of(INPUTS, {"all": list(INPUTS)}) == ("all", DUMMY)
+    assert factors_of(INPUTS, {"late": ["e", "a"], "b2": ["b"]}) == ("late", "b2", "c", "d", DUMMY)
+
+
+@pytest.mark.parametrize("groups", [{}, GROUPS, {"first": ["e", "a", "c"], "single": ["d"]}])
+@pytest.mark.parametrize("second_order", [False, True])
+def test_rows_of_a_block_differ_in_one_factor(
+    groups: dict[str, list[str]], second_order: bool
+) -> None:
+    design = draw_saltelli(INPUTS, groups, 64, 5, second_order=second_order)
+    cube = blocks_of(design)
+    a, b = cube[:, 0], cube[:, -1]
+    d = len(design.factors)
+    starts = [(1, a, b)] + ([(1 + d, b, a)] if second_order else [])
+    for start, base, donor in starts:
+        for k, factor in enumerate(design.factors):
+            row = cube[:, start + k]
+            members = groups.get(factor, [factor])
+            for column, name in enumerate(INPUTS):
+                if factor == DUMMY:
+                    # Two nudges of at most 1e-4 each.
+                    assert np.abs(row[:, column] - base[:, column]).max() <= 2.0 * NUDGE
+                elif name in members:
+                    # The value comes from the other base point, its nudge from this one.
+                    assert np.abs(row[:, column] - donor[:, column]).max() <= 2.0 * NUDGE
+                    assert (np.abs(row[:, column] - base[:, column]) > 2.0 * NUDGE).mean() > 0.99
+                else:
+                    np.testing.assert_array_equal(row[:, column], base[:, column])
+
+
+def test_the_dummys_row_moves_every_input() -> None:
+    cube = blocks_of(draw_saltelli(INPUTS, {}, 64, 5))
+    moved = np.abs(cube[:, 6] - cube[:, 0])
+    assert np.all(moved.max(axis=0) > NUDGE)
+    # Each input on its own: no two of them by the same amount.
+    assert len(np.unique(np.round(moved[0], 12))) == 5
+
+
+# -- streams ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("groups", [{}, GROUPS])
+@pytest.mark.parametrize("second_order", [False, True])
+def test_a_larger_design_begins_with_the_smaller_one(
+    groups: dict[str, list[str]], second_order: bool
+) -> None:
+    small, middle, large = (
+        draw_saltelli(INPUTS, groups, n, 9, second_order=second_order) for n in (64, 128, 256)
+    )
+    for less, more in ((small, middle), (middle, large)):
+        np.testing.assert_array_equal(more.uniforms[: len(less.uniforms)], less.uniforms)
+        np.testing.assert_array_equal(more.scramble[: len(less.scramble)], less.scramble)
+
+
+def test_designs_are_a_function_of_the_seed_alone() -> None:
+    np.random.seed(1)  # noqa: NPY002
+    one = draw_saltelli(INPUTS, {}, 64, 4)
+    np.random.seed(2)  # noqa: NPY002
+    following = np.random.random(5)  # noqa: NPY002
+    np.random.seed(2)  # noqa: NPY002
+    two = draw_saltelli(INPUTS, {}, 64, 4)
+    np.testing.assert_array_equal(np.random.random(5), following)  # noqa: NPY002
+    np.testing.assert_array_equal(one.uniforms, two.uniforms)
+    assert not np.isin(draw_saltelli(INPUTS, {}, 64, 5).uniforms, one.uniforms).any()
+
+
+def test_scrambles_share_no_value() -> None:
+    cube = blocks_of(draw_saltelli(INPUTS, {}, 128, 4))[:, [0, -1]].reshape(8, SCRAMBLES, -1)
+    for k in range(1, SCRAMBLES):
+        assert not np.isin(cube[:, k], cube[:, :k]).any()
+
+
+# -- where the points lie --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_uniforms_lie_inside_the_cube(seed: int) -> None:
+    uniforms = draw_saltelli(INPUTS, {}, 256, seed).uniforms
+    assert uniforms.min() > 0.0
+    assert uniforms.max() < 1.0
+
+
+@pytest.mark.parametrize("row", range(7))
+def test_marginals_of_every_row_of_a_block_are_uniform(row: int) -> None:
+    # The 64 points of a scramble are a net: one in each 64th of every column (H. Niederreiter,
+    # Random Number Generation and Quasi-Monte Carlo Methods, 1992, section 4.1), moved by a nudge.
+    points = np.sort(blocks_of(draw_saltelli(INPUTS, {}, 1024, 2))[:, row], axis=0)
+    middles = (np.arange(1024) + 0.5) / 1024
+    assert np.abs(points - middles[:, None]).max() <= 1.0 / 64.0 + NUDGE
+
+
+def test_base_points_and_their_donors_are_unrelated() -> None:
+    # Two columns of a scramble of few points may correlate by up to about 0.4, with either sign (a
+    # poor projection of Sobol's sequence): a mean over 16 scrambles and 16 designs scatters by at
+    # most 0.4 / 16, four of these. Nearly all pairs correlate less than independent points do.
+    tables = []
+    for seed in range(16):
+        cube = blocks_of(draw_saltelli(INPUTS, {}, 256, seed))
+        tables.append(np.corrcoef(np.concatenate([cube[:, 0], cube[:, -1]], axis=1).T))
+    off = ~np.eye(10, dtype=bool)
+    assert np.abs(np.mean(tables, axis=0)[off]).max() < 0.1
+    assert np.median(np.abs(np.array(tables)[:, off])) < 1.0 / 16.0
+
+
+@QUIET
+@given(
+    hnp.arrays(float, (5, 3), elements=st.floats(0.0, 1.0)),
+    hnp.arrays(float, 5, elements=st.floats(0.0, 1.0)),
+)
+def test_a_nudge_is_small_and_stays_in_the_cube(uniforms: Array, dummy: Array) -> None:
+    moved = nudged(uniforms, dummy)
+    assert np.abs(moved - uniforms).max() <= NUDGE * (1.0 + 1e-9)
+    assert moved.min() >= 0.0
+    assert moved.max() <= 1.0
+
+
+def test_a_nudge_keeps_a_uniform_uniform() -> None:
+    # Reflection keeps the uniform law; about a border as anywhere. 1,000 of 1e5 are expected below
+    # 0.01 and above 0.99, with a standard deviation of 31.
+    rng = np.random.default_rng(3)
+    moved = nudged(rng.random((100_000, 1)), rng.random(100_000))
+    assert abs((moved < 0.01).sum() - 1000) < 130
+    assert abs((moved > 0.99).sum() - 1000) < 130
+    assert abs((moved < NUDGE).sum() - 10) <= 13
+
+
+# -- what the dummy feels --------------------------------------------------------------------
+
+
+def test_the_dummy_of_a_smooth_function_has_no_effect() -> None:
+    design = draw_saltelli(INPUTS, {}, 256, 1)
+    found = indices_of(design, np.exp(design.uniforms @ [1.0, 0.5, 2.0, 1.0, 0.1]))
+    assert 0.0 < found.total[0, -1, 0] < 1e-6
+    assert abs(found.first[0, -1, 0]) < 1e-3
+
+
+def test_the_dummy_of_a_chaotic_function_has_all_of_it() -> None:
+    # sin(1e6 u) turns by up to 100 rad within a nudge: outputs that differ in the dummy correlate
+    # by J0(100)^2 = 4e-4 (mean of exp(i z sin t) over a turn: Abramowitz and Stegun, 9.1.21).
+    design = draw_saltelli(INPUTS, {}, 1024, 1)
+    found = indices_of(design, np.sin(1e6 * design.uniforms[:, 0]))
+    expected = 1.0 - special.j0(1e6 * NUDGE) ** 2
+    assert found.total[0, -1, 0] == pytest.approx(expected, abs=0.1)
+    assert found.total[0, 0, 0] == pytest.approx(1.0, abs=0.1)
+    assert abs(found.first[0, -1, 0]) < 0.15
+    np.testing.assert_array_equal(found.total[0, 1:5, 0], 0.0)
+
+
+def test_the_dummys_total_is_the_share_of_the_noise() -> None:
+    # u has variance 1/12, 0.2 sin(1e6 v) has 0.02.
+    design = draw_saltelli(INPUTS, {}, 1024, 6)
+    u = design.uniforms
+    found = indices_of(design, u[:, 0] + 0.2 * np.sin(1e6 * u[:, 1]))
+    assert found.total[0, -1, 0] == pytest.approx(0.02 / (0.02 + 1.0 / 12.0), rel=0.1)
+    assert found.first[0, 0, 0] == pytest.approx((1.0 / 12.0) / (0.02 + 1.0 / 12.0), rel=0.1)
+
+
+def test_a_group_explains_what_its_members_explain_together() -> None:
+    # f = b d + a, uniforms: V(b d) = 1/9 - 1/16 = 7/144, V(a) = 12/144. The product's interaction
+    # lies within the group, so its first and total index are both 7/19. The product scatters them
+    # by about 0.016 (intervals of 0.03 either way).
+    design = draw_saltelli(INPUTS, GROUPS, 1024, 8)
+    u = design.uniforms
+    found = indices_of(design, u[:, 1] * u[:, 3] + u[:, 0])
+    place = design.factors.index("pair")
+    assert found.first[0, place, 0] == pytest.approx(7.0 / 19.0, abs=0.06)
+    assert found.total[0, place, 0] == pytest.approx(7.0 / 19.0, abs=0.06)
+    assert found.first[0, 0, 0] == pytest.approx(12.0 / 19.0, abs=0.06)

@@ -1,0 +1,844 @@
+"""The Sobol' study from file to folder: known indices, doubling, failures, what it says."""
+
+import itertools
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from headform_studies import (
+    EXPONENTS,
+    FAILING,
+    INPUTS,
+    SOFTEST,
+    SPREADS,
+    assert_holds,
+    by_formula,
+    closed_form,
+    copy_of,
+    first_order,
+    global_state,
+    mcstudy,
+    recorded_parts,
+    run_text,
+    second_order,
+    shares,
+    study_text,
+    total_order,
+    unfinished,
+    without_figures,
+)
+
+from mcstudy.errors import StudyError, UserError
+from mcstudy.results import ResultsFolder, digest
+from models.registry import load_model
+from studies import api, sobol, sobol_report
+from studies.failure_report import failure_map
+
+BLOCK = 6
+"""Rows of a base point: A, B, three inputs and the dummy."""
+SECOND = study_text("sobol", "n = 128\nsecond_order = true", outputs=("hic15",), force=100000.0)
+
+
+def plain(n: int = 64, **options: Any) -> str:
+    return study_text("sobol", f"n = {n}", **options)
+
+
+def doubling(tolerance: float, start: int = 64, n: int = 256) -> str:
+    return study_text("sobol", f"start = {start}\nn = {n}\ntolerance = {tolerance}")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> ResultsFolder:
+    """Return a study of 128 base points with second order, with its figures."""
+    results = ResultsFolder(tmp_path_factory.mktemp("sobol") / "second")
+    run_text(SECOND, results)
+    return results
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> ResultsFolder:
+    """Return a study of 64 base points by formula, without figures."""
+    results = ResultsFolder(tmp_path_factory.mktemp("sobol") / "small")
+    with by_formula(), without_figures():
+        run_text(plain(), results)
+    return results
+
+
+@pytest.fixture(scope="module")
+def failing(tmp_path_factory: pytest.TempPathFactory) -> ResultsFolder:
+    """Return a study in which the softest hoods fail, within its limit, with the map of it."""
+    results = ResultsFolder(tmp_path_factory.mktemp("sobol") / "failing")
+    with by_formula(), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sobol, "draw", failure_map)
+        run_text(plain(inputs=FAILING, force=100.0, limit=0.5, outputs=("hic15",)), results)
+    return results
+
+
+@pytest.fixture
+def undrawn() -> Iterator[None]:
+    """Leave the figures out."""
+    with without_figures():
+        yield
+
+
+@pytest.fixture
+def fast(undrawn: None) -> Iterator[None]:
+    """Leave the figures out and run by formula."""
+    with by_formula():
+        yield
+
+
+# -- the numbers ------------------------------------------------------------------------------
+
+
+def test_the_formula_is_the_headform_model() -> None:
+    model = load_model("headform", {"hood_curve": [[0.0, 0.0], [0.1, 100.0]], "channel_class": 0.0})
+    names = [item.name for item in model.inputs]
+    rows = np.tile([item.nominal for item in model.inputs], (5, 1))
+    rows[:, names.index("hood_force_scale")] = (0.9 * SOFTEST, 1.1 * SOFTEST, 60.0, 100.0, 150.0)
+    rows[:, names.index("impact_speed")] = (8.0, 8.0, 6.0, 8.0, 11.0)
+    rows[:, names.index("headform_mass")] = (2.5, 2.5, 2.0, 2.5, 3.5)
+    batch = model.run_batch(rows)
+    argument = {"name": "headform", "options": {"hood_curve": [[0.0, 0.0], [0.1, 100.0]]}}
+    outputs, status = closed_form(argument, rows)
+    assert batch.status == status == ["time_limit", "ok", "ok", "ok", "ok"]
+    for name in EXPONENTS:
+        place = [item.name for item in model.outputs].index(name)
+        ratio = batch.outputs[2:, place] / outputs[2:, place]
+        assert ratio == pytest.approx(ratio[0], rel=2e-3)
+
+
+@pytest.mark.parametrize("output", list(EXPONENTS))
+def test_indices_are_those_of_the_closed_form(folder: ResultsFolder, output: str) -> None:
+    entry = folder.read_json("analysis.json")["outputs"][output]
+    parts = shares(output)
+    for name in SPREADS:
+        assert_holds(entry["first"][name], first_order(parts)[name])
+        assert_holds(entry["total"][name], total_order(parts)[name])
+        assert entry["total"][name]["value"] == pytest.approx(total_order(parts)[name], abs=0.1)
+    for pair, truth in second_order(parts).items():
+        assert_holds(entry["second"][pair], truth)
+
+
+def test_analysis_names_every_factor_the_dummy_and_every_pair(folder: ResultsFolder) -> None:
+    analysis = folder.read_json("analysis.json")
+    factors = [*SPREADS, "dummy"]
+    assert analysis["factors"] == factors
+    assert analysis["runs"] == 128 * 10
+    assert analysis["base_points"] == 128
+    assert analysis["status"] == {"ok": 1280}
+    assert analysis["failures"]["runs"] == 0
+    for entry in analysis["outputs"].values():
+        assert list(entry["first"]) == list(entry["total"]) == factors
+        pairs = [f"{a} x {b}" for a, b in itertools.combinations(factors, 2)]
+        assert list(entry["second"]) == pairs
+        assert entry["base_points"] == 128
+    assert analysis["outputs"]["hic15"]["total"]["dummy"]["high"] < 1e-5
+
+
+def test_the_variance_is_that_of_the_runs(folder: ResultsFolder) -> None:
+    runs = folder.runs()
+    base = runs[runs["run"] % 10 % 9 == 0]
+    entry = folder.read_json("analysis.json")["outputs"]["hic15"]
+    assert entry["variance"] == pytest.approx(base["hic15"].var(ddof=0), rel=1e-9)
+
+
+def test_inputs_of_a_block_are_those_of_a_with_one_from_b(folder: ResultsFolder) -> None:
+    runs, names = folder.runs(), list(SPREADS)
+    cube = runs[names].to_numpy().reshape(128, 10, 3)
+    for k in range(3):
+        others = [j for j in range(3) if j != k]
+        assert np.array_equal(cube[:, 1 + k, others], cube[:, 0, others])
+        assert np.array_equal(cube[:, 5 + k, others], cube[:, 9, others])
+        assert np.all(np.abs(cube[:, 1 + k, k] / cube[:, 9, k] - 1.0) < 0.05)
+    moved = np.abs(cube[:, 4] / cube[:, 0] - 1.0)
+    assert 0.0 < moved.max() < 0.05
+    speed = runs["impact_speed"]
+    assert speed.median() == pytest.approx(30.0 / 3.6, rel=0.01)
+
+
+def test_convergence_ends_with_the_whole_design(folder: ResultsFolder) -> None:
+    analysis = folder.read_json("analysis.json")
+    steps = analysis["convergence"]["hic15"]
+    assert [step["n"] for step in steps] == [8, 16, 32, 64, 128]
+    entry = analysis["outputs"]["hic15"]
+    for name in analysis["factors"]:
+        last = steps[-1]["total"][name]["value"]
+        assert last == pytest.approx(entry["total"][name]["value"], rel=1e-12)
+
+
+def test_main_effect_follows_the_power_of_the_input(folder: ResultsFolder) -> None:
+    effect = folder.read_json("analysis.json")["main_effects"]["hic15"]["impact_speed"]
+    slope = np.polyfit(np.log(effect["x"]), np.log(effect["mean"]), 1)[0]
+    assert slope == pytest.approx(2.5, abs=0.3)
+
+
+def test_widest_is_the_widest_total_interval_of_the_reported_outputs(
+    small: ResultsFolder,
+) -> None:
+    analysis = small.read_json("analysis.json")
+    widths = [
+        entry["high"] - entry["low"]
+        for output in ("hic15", "peak_force")
+        for name, entry in analysis["outputs"][output]["total"].items()
+        if name != "dummy"
+    ]
+    assert analysis["widest"] == pytest.approx(max(widths), rel=1e-12)
+
+
+def test_a_group_of_dependent_inputs_has_the_index_of_its_sum(tmp_path: Path, fast: None) -> None:
+    text = plain(
+        256,
+        more='[groups]\ntest = ["impact_speed", "headform_mass"]\n'
+        '[dependence]\ncorrelations = [["impact_speed", "headform_mass", 0.6]]\n',
+    )
+    analysis = run_text(text, ResultsFolder(tmp_path / "group"))
+    assert analysis["factors"] == ["test", "hood_force_scale", "dummy"]
+    speed, mass = 2.5 * 0.12, -0.75 * 0.2
+    parts = {
+        "test": speed**2 + mass**2 + 2.0 * 0.6 * speed * mass,
+        "hood_force_scale": (0.75 * 0.3) ** 2,
+    }
+    entry = analysis["outputs"]["hic15"]
+    for name in parts:
+        assert_holds(entry["first"][name], first_order(parts)[name])
+        assert_holds(entry["total"][name], total_order(parts)[name])
+    html = (tmp_path / "group" / "report.html").read_text()
+    assert "test: impact speed, headform mass" in html
+
+
+def test_any_run_can_be_run_again_to_the_same_bits(folder: ResultsFolder) -> None:
+    row = folder.runs().iloc[1234]
+    again = api.rerun(folder, 1234)
+    assert {name: row[name] for name in again.outputs} == dict(again.outputs)
+
+
+def test_numpys_global_random_state_is_left_alone(tmp_path: Path, fast: None) -> None:
+    np.random.seed(5)  # noqa: NPY002
+    before = global_state()
+    run_text(plain(), ResultsFolder(tmp_path / "state"))
+    assert global_state() == before
+
+
+# -- doubling, extension, resumption ----------------------------------------------------------
+
+
+def test_a_tolerance_met_early_stops_the_doubling(tmp_path: Path, fast: None) -> None:
+    results = ResultsFolder(tmp_path / "early")
+    analysis = run_text(doubling(0.9), results)
+    assert analysis["base_points"] == 64
+    assert analysis["widest"] <= analysis["tolerance"] == 0.9
+    assert len(results.runs()) == 64 * BLOCK
+    assert "The study asked for 0.9: met." in (results.path / "report.html").read_text()
+    manifest = results.read_json("manifest.json")
+    assert manifest["finished"]
+    assert manifest["design"]["base_points"] == 64
+
+
+def test_doubling_spends_the_budget_and_repeats_no_run(tmp_path: Path, fast: None) -> None:
+    results = ResultsFolder(tmp_path / "budget")
+    with recorded_parts() as ids:
+        analysis = run_text(doubling(1e-6), results)
+    assert sorted(ids) == list(range(256 * BLOCK))
+    assert analysis["base_points"] == 256
+    html = (results.path / "report.html").read_text()
+    assert "The study asked for 1e-06: NOT met" in html
+    manifest = results.read_json("manifest.json")
+    assert manifest["digest"] == digest(results.runs())
+    at_once = ResultsFolder(tmp_path / "at_once")
+    run_text(plain(256), at_once)
+    assert manifest["digest"] == at_once.read_json("manifest.json")["digest"]
+
+
+def test_doubling_stops_at_the_first_design_within_the_tolerance(
+    folder: ResultsFolder, tmp_path: Path, fast: None
+) -> None:
+    results = ResultsFolder(tmp_path / "doubling")
+    rough = run_text(doubling(0.9), results)["widest"]
+    tolerance = 0.6 * rough
+    with recorded_parts() as ids:
+        analysis = run_text(doubling(tolerance, n=1024), results)
+    assert 64 < analysis["base_points"] <= 1024
+    assert analysis["widest"] <= tolerance
+    # What the looser tolerance had run is not run again.
+    assert sorted(ids) == list(range(64 * BLOCK, analysis["base_points"] * BLOCK))
+
+
+def test_a_start_above_the_budget_is_cut(tmp_path: Path, fast: None) -> None:
+    results = ResultsFolder(tmp_path / "start")
+    assert run_text(doubling(1e-6, start=256, n=64), results)["base_points"] == 64
+    assert len(results.runs()) == 64 * BLOCK
+
+
+def test_a_larger_design_keeps_the_rows_of_a_smaller_one(
+    small: ResultsFolder, tmp_path: Path, fast: None
+) -> None:
+    results = copy_of(small, tmp_path / "grown")
+    before = results.runs()
+    with recorded_parts() as ids:
+        run_text(plain(128), results)
+    assert sorted(ids) == list(range(64 * BLOCK, 128 * BLOCK))
+    after = results.runs()
+    pd.testing.assert_frame_equal(after.iloc[: len(before)], before, check_exact=True)
+    fresh = ResultsFolder(tmp_path / "fresh")
+    run_text(plain(128), fresh)
+    assert digest(fresh.runs()) == digest(after)
+
+
+def test_a_smaller_design_reports_its_own_runs_and_drops_none(
+    small: ResultsFolder, tmp_path: Path, fast: None
+) -> None:
+    results = ResultsFolder(tmp_path / "shrunk")
+    run_text(plain(128), results)
+    with recorded_parts() as ids:
+        analysis = run_text(plain(64), results)
+    assert ids == []
+    assert analysis == small.read_json("analysis.json")
+    assert len(results.runs()) == 128 * BLOCK
+
+
+def test_the_same_command_again_runs_nothing_anew(
+    small: ResultsFolder, tmp_path: Path, fast: None
+) -> None:
+    results = copy_of(small, tmp_path / "again")
+    before = (results.path / "runs.parquet").read_bytes()
+    with recorded_parts() as ids:
+        run_text(plain(), results)
+    assert ids == []
+    assert (results.path / "runs.parquet").read_bytes() == before
+
+
+def test_digest_is_the_same_with_two_workers(tmp_path: Path, undrawn: None) -> None:
+    speed = INPUTS.partition("[inputs.headform_mass]")[0]
+    digests = []
+    for workers in (1, 2):
+        results = ResultsFolder(tmp_path / str(workers))
+        run_text(plain(inputs=speed, force=100000.0), results, workers=workers)
+        digests.append(results.read_json("manifest.json")["digest"])
+    assert digests[0] == digests[1]
+
+
+def test_digest_is_the_same_after_a_kill(small: ResultsFolder, tmp_path: Path, fast: None) -> None:
+    runs = small.runs()
+    left = runs[(runs["run"] % 7 != 3) & ~runs["run"].between(100, 180)]
+    part = unfinished(small, tmp_path / "part", left)
+    with recorded_parts() as ids:
+        analysis = run_text(plain(), part)
+    assert sorted(ids) == sorted(set(range(64 * BLOCK)) - set(left["run"]))
+    assert part.read_json("manifest.json")["digest"] == small.read_json("manifest.json")["digest"]
+    assert analysis == small.read_json("analysis.json")
+
+
+@pytest.mark.parametrize(
+    ("edit", "differs"),
+    [
+        (("n = 64", "n = 64\nsecond_order = true"), "design.second_order"),
+        (("[report]", '[groups]\npair = ["impact_speed", "headform_mass"]\n[report]'), "groups"),
+        (("sigma = 0.12", "sigma = 0.13"), "inputs.impact_speed"),
+        (("seed = 11", "seed = 12"), "seed"),
+        (("channel_class = 0.0", "channel_class = 1000.0"), "model"),
+    ],
+)
+def test_a_changed_study_is_refused_with_what_differs(
+    small: ResultsFolder, edit: tuple[str, str], differs: str
+) -> None:
+    text = plain().replace(*edit, 1)
+    assert text != plain()
+    before = (small.path / "manifest.json").read_bytes()
+    with pytest.raises(UserError, match=rf"differs in {re.escape(differs)}\)"):
+        run_text(text, small)
+    assert (small.path / "manifest.json").read_bytes() == before
+
+
+@pytest.mark.parametrize("edit", [("n = 64", "n = 128"), ("resamples = 100", "resamples = 120")])
+def test_what_leaves_the_rows_alone_is_allowed(
+    small: ResultsFolder, tmp_path: Path, fast: None, edit: tuple[str, str]
+) -> None:
+    results = copy_of(small, tmp_path / "allowed")
+    assert run_text(plain().replace(*edit, 1), results)["base_points"] in (64, 128)
+
+
+# -- unfinished folders -----------------------------------------------------------------------
+
+
+def test_an_unfinished_folder_reports_on_its_whole_base_points(
+    small: ResultsFolder, tmp_path: Path, fast: None
+) -> None:
+    runs = small.runs()
+    # Run 20 * 6 + 2 is missing: twenty base points are whole.
+    part = unfinished(small, tmp_path / "part", runs[runs["run"] != 20 * BLOCK + 2])
+    answer = mcstudy("report", part.path, "--json")
+    assert answer.code == 0, answer.err
+    analysis = json.loads(answer.out)["analysis"]
+    assert analysis["base_points"] == 20
+    assert analysis["runs"] == 20 * BLOCK
+    assert json.loads((part.path / "analysis.json").read_text()) == analysis
+    status = json.loads(mcstudy("status", part.path, "--json").out)
+    assert status == {"done": 383, "total": 384, "counts": {"ok": 383}}
+
+
+def test_too_few_base_points_are_told_to_be_run(small: ResultsFolder, tmp_path: Path) -> None:
+    runs = small.runs()
+    part = unfinished(small, tmp_path / "few", runs[runs["run"] != 7 * BLOCK + 5])
+    answer = mcstudy("report", part.path)
+    assert answer.code == 2
+    assert "run the study again" in answer.err
+    assert not (part.path / "analysis.json").exists()
+
+
+def test_a_kill_while_doubling_is_gone_on_with(
+    small: ResultsFolder, tmp_path: Path, fast: None
+) -> None:
+    whole = ResultsFolder(tmp_path / "whole")
+    run_text(doubling(1e-6, n=128), whole)
+    runs = whole.runs()
+    part = unfinished(whole, tmp_path / "part", runs[runs["run"] < 100 * BLOCK + 1])
+    assert api.build_report(part)["base_points"] == 100
+    with recorded_parts() as ids:
+        analysis = run_text(doubling(1e-6, n=128), part)
+    assert sorted(ids) == list(range(100 * BLOCK + 1, 128 * BLOCK))
+    assert analysis == whole.read_json("analysis.json")
+
+
+def test_a_folder_without_a_study_or_runs_is_a_users_error(
+    small: ResultsFolder, tmp_path: Path
+) -> None:
+    assert mcstudy("report", tmp_path).code == 2
+    empty = ResultsFolder(tmp_path / "empty")
+    with empty.open_for_writing():
+        for name in ("study.toml", "manifest.json"):
+            empty.write_text(name, (small.path / name).read_text())
+    answer = mcstudy("report", empty.path)
+    assert answer.code == 2
+    assert "holds no runs" in answer.err
+
+
+# -- dependence -------------------------------------------------------------------------------
+
+
+def test_dependent_inputs_of_two_factors_are_refused(tmp_path: Path) -> None:
+    study, out = tmp_path / "dependent.toml", tmp_path / "out"
+    more = '[dependence]\ncorrelations = [["impact_speed", "headform_mass", 0.5]]\n'
+    study.write_text(plain(more=more))
+    answer = mcstudy("run", study, "--out", out)
+    assert answer.code == 2
+    assert len(answer.err.strip().splitlines()) == 1
+    for word in ("'impact_speed'", "'headform_mass'", "sobol", "group", "mcstudy sensitivity"):
+        assert word in answer.err
+    assert not out.exists()
+
+
+def test_one_of_two_dependent_inputs_in_a_group_is_refused(tmp_path: Path) -> None:
+    more = (
+        '[groups]\ntest = ["impact_speed", "hood_force_scale"]\n'
+        '[dependence]\ncorrelations = [["impact_speed", "headform_mass", 0.5]]\n'
+    )
+    with pytest.raises(UserError, match="'impact_speed' and 'headform_mass' depend"):
+        run_text(plain(more=more), ResultsFolder(tmp_path / "out"))
+
+
+def test_an_input_drawn_given_another_is_dependent_too(tmp_path: Path) -> None:
+    text = Path("configs/paper_sobol.toml").read_text()
+    text = re.sub(r"\nchild = .*", "", text)
+    text = re.sub(r"\[dependence\].*?(?=\[report\])", "", text, flags=re.DOTALL)
+    with pytest.raises(UserError, match="'stature' and 'age' depend on each other"):
+        run_text(text, ResultsFolder(tmp_path / "out"))
+
+
+@pytest.mark.parametrize(
+    ("groups", "message"),
+    [
+        ('pair = ["impact_speed", "nope"]', "'nope' is not a sampled input"),
+        ('impact_speed = ["headform_mass"]', "an input has this name already"),
+        ('a = ["impact_speed"]\nb = ["impact_speed"]', "in groups 'a' and 'b'"),
+        ('dummy = ["impact_speed"]', "dummy"),
+    ],
+)
+def test_wrong_groups_are_users_errors(tmp_path: Path, groups: str, message: str) -> None:
+    study = tmp_path / "groups.toml"
+    study.write_text(plain(more=f"[groups]\n{groups}\n"))
+    answer = mcstudy("run", study, "--out", tmp_path / "out")
+    assert answer.code == 2
+    assert message in answer.err
+
+
+@pytest.mark.parametrize("design", ["n = 100", "n = 32", "n = 64\nstart = 96", "tolerance = 0.0"])
+def test_wrong_designs_are_users_errors(tmp_path: Path, design: str) -> None:
+    study = tmp_path / "design.toml"
+    study.write_text(study_text("sobol", design))
+    answer = mcstudy("run", study, "--out", tmp_path / "out")
+    assert answer.code == 2
+    assert "design" in answer.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_correlation_of_an_unknown_input_is_told_as_such(tmp_path: Path) -> None:
+    more = (
+        '[groups]\ntest = ["impact_speed", "headform_mass"]\n'
+        '[dependence]\ncorrelations = [["impact_speed", "headfrom_mass", 0.5]]\n'
+    )
+    with pytest.raises(UserError, match="'headfrom_mass' is not a sampled input"):
+        run_text(plain(more=more), ResultsFolder(tmp_path / "out"))
+
+
+# -- failed runs and missing values -----------------------------------------------------------
+
+
+def test_base_points_with_a_failed_run_are_left_out_whole(failing: ResultsFolder) -> None:
+    runs, analysis = failing.runs(), failing.read_json("analysis.json")
+    block = 5
+    failed = (runs["status"] != "ok").to_numpy()
+    assert 0 < failed.sum() == analysis["failures"]["runs"]
+    hit = np.unique(np.flatnonzero(failed) // block)
+    assert analysis["failures"]["blocks"] == hit.size
+    assert analysis["failures"]["share"] == pytest.approx(failed.mean())
+    assert analysis["base_points"] == 64
+    assert analysis["outputs"]["hic15"]["base_points"] == 64 - hit.size
+    assert analysis["status"] == runs["status"].value_counts().to_dict()
+    # Without the lost base points the variance is that of the whole ones.
+    kept = runs[~np.isin(runs["run"] // block, hit)]
+    base = kept[kept["run"] % block == 0]["hic15"].to_numpy()
+    other = kept[kept["run"] % block == block - 1]["hic15"].to_numpy()
+    centred = np.concatenate([base, other])
+    assert analysis["outputs"]["hic15"]["variance"] == pytest.approx(centred.var(), rel=1e-9)
+
+
+def test_failures_are_located(failing: ResultsFolder) -> None:
+    failures = failing.read_json("analysis.json")["failures"]
+    assert failures["where"]["hood_force_scale"]["mean_rank"] < 0.1
+    assert failures["where"]["hood_force_scale"]["place"] == "low"
+    share = failures["map"]["hood_force_scale"]
+    assert share[0] > 0.3
+    assert share[1:] == [0.0] * 9
+    html = (failing.path / "report.html").read_text()
+    assert "runs failed" in html
+    assert "hood force scale low" in html
+    assert "Share of failed runs in each tenth of each input." in html
+    for ending in ("png", "svg"):
+        assert (failing.path / "figures" / f"failures.{ending}").stat().st_size > 1000
+
+
+def test_failed_runs_do_not_enter_the_main_effects(
+    failing: ResultsFolder, tmp_path: Path, fast: None
+) -> None:
+    runs = failing.runs()
+    # A model may leave numbers in a failed run; they are no outcome.
+    runs.loc[runs["status"] != "ok", "hic15"] = 1e9
+    spoilt = copy_of(failing, tmp_path / "spoilt", runs)
+    effects = api.build_report(spoilt)["main_effects"]["hic15"]
+    assert max(effects["hood_force_scale"]["mean"]) < 1e6
+
+
+def test_too_many_failed_runs_stop_the_study_and_its_report(
+    failing: ResultsFolder, tmp_path: Path, fast: None
+) -> None:
+    study, out = tmp_path / "failing.toml", tmp_path / "out"
+    text = (failing.path / "study.toml").read_text()
+    study.write_text(text.replace("max_failure_rate = 0.5", "max_failure_rate = 0.01"))
+    answer = mcstudy("run", study, "--out", out, "--workers", "1")
+    assert answer.code == 1
+    assert re.search(r"\d+\.\d% of the runs failed \(\d+ time_limit\)", answer.err)
+    assert "max_failure_rate = 1.0%" in answer.err
+    report = mcstudy("report", out)
+    assert report.code == 1
+    assert report.err == answer.err
+    assert len(ResultsFolder(out).runs()) == 64 * 5
+    # With the limit raised everything that ran is used.
+    study.write_text(text)
+    with recorded_parts() as ids:
+        again = mcstudy("run", study, "--out", out, "--workers", "1")
+    assert again.code == 0, again.err
+    assert ids == []
+
+
+def test_an_output_with_too_few_values_gets_no_index(
+    small: ResultsFolder, tmp_path: Path, fast: None
+) -> None:
+    runs = small.runs()
+    # One row of each of fourteen base points, more than a fifth of 64, and of two in another.
+    lost = runs["run"] % BLOCK == 2
+    runs.loc[lost & (runs["run"] // BLOCK < 14), "clip_3ms"] = np.nan
+    runs.loc[lost & (runs["run"] // BLOCK < 2), "peak_force"] = np.nan
+    part = copy_of(small, tmp_path / "values", runs)
+    analysis = api.build_report(part)
+    clip, force = (analysis["outputs"][name] for name in ("clip_3ms", "peak_force"))
+    assert clip == {"unit": "g", "base_points": 50}
+    assert force["base_points"] == 62
+    assert_holds(force["total"]["impact_speed"], total_order(shares("peak_force"))["impact_speed"])
+    assert analysis["outputs"]["hic15"] == small.read_json("analysis.json")["outputs"]["hic15"]
+    html = (part.path / "report.html").read_text()
+    assert "No index is given" in html
+    assert "3 ms head acceleration (50 of 64)" in html
+
+
+def test_a_reported_output_without_values_leaves_the_others(
+    small: ResultsFolder, tmp_path: Path, fast: None
+) -> None:
+    runs = small.runs().assign(hic15=np.nan)
+    part = copy_of(small, tmp_path / "one", runs)
+    answer = mcstudy("report", part.path)
+    assert answer.code == 0, answer.err
+    assert "of peak force" in answer.line.lower()
+    assert "HIC15 (0 of 64)" in (part.path / "report.html").read_text()
+    none = copy_of(small, tmp_path / "none", runs.assign(peak_force=np.nan))
+    lost = mcstudy("report", none.path)
+    assert lost.code == 1
+    assert "hic15, peak_force: too few" in lost.err
+
+
+def test_a_constant_output_is_said_not_to_vary(
+    small: ResultsFolder, tmp_path: Path, fast: None
+) -> None:
+    part = copy_of(small, tmp_path / "flat", small.runs().assign(hic15=700.1))
+    answer = mcstudy("report", part.path)
+    assert answer.code == 0, answer.err
+    assert "HIC15 does not vary." in answer.line
+    total = ResultsFolder(part.path).read_json("analysis.json")["outputs"]["hic15"]["total"]
+    assert {entry["value"] for entry in total.values()} == {None}
+
+
+def test_a_study_of_constant_outputs_alone_is_reported(
+    small: ResultsFolder, tmp_path: Path
+) -> None:
+    runs = small.runs().assign(hic15=700.0, peak_force=5000.0)
+    part = copy_of(small, tmp_path / "flat", runs)
+    analysis = api.build_report(part)
+    assert sobol_report.summarise(analysis) == ["HIC15 does not vary.", "Peak force does not vary."]
+
+
+# -- report and command line ------------------------------------------------------------------
+
+
+def test_report_is_self_contained_and_plain(folder: ResultsFolder) -> None:
+    html = (folder.path / "report.html").read_text()
+    assert "<script" not in html
+    assert "Headform &amp; &lt;script&gt;" in html
+    assert all(link.startswith("data:image/") for link in re.findall(r'src="([^"]*)"', html))
+    assert all(link.startswith("#") for link in re.findall(r'href="([^"]*)"', html))
+    assert not re.search(r"url\(|@import|<link|<iframe", html)
+    assert re.search(r"1,280 runs of the headform model: 128 base points, seed 11", html)
+    for words in ("HIC15", "impact speed", "hood force scale", "dummy"):
+        assert words in html
+
+
+def test_every_figure_is_there_twice(folder: ResultsFolder) -> None:
+    names = {"indices", "heatmap", "convergence"} | {
+        f"{kind}_hic15" for kind in ("main_effects", "second_order")
+    }
+    files = {file.name for file in (folder.path / "figures").iterdir()}
+    assert files == {f"{name}.{ending}" for name in names for ending in ("png", "svg")}
+    for file in (folder.path / "figures").iterdir():
+        start = file.read_bytes()[:300]
+        assert (
+            start.startswith(b"\x89PNG")
+            if file.suffix == ".png"
+            else b"<svg" in start or (b"<?xml" in start)
+        )
+
+
+def test_report_is_rebuilt_to_the_same_bytes(folder: ResultsFolder, undrawn: None) -> None:
+    first = (folder.path / "analysis.json").read_bytes()
+    html = (folder.path / "report.html").read_text()
+    (folder.path / "analysis.json").unlink()
+    answer = mcstudy("report", folder.path)
+    assert answer.code == 0, answer.err
+    assert (folder.path / "analysis.json").read_bytes() == first
+    # The figures are left out here: the words are the same.
+    rebuilt = (folder.path / "report.html").read_text()
+    (folder.path / "report.html").write_text(html)
+    assert re.findall(r"<td.*?</td>", rebuilt) == re.findall(r"<td.*?</td>", html)
+
+
+def test_run_prints_what_drives_the_outputs(
+    small: ResultsFolder, tmp_path: Path, fast: None
+) -> None:
+    study = tmp_path / "small.toml"
+    study.write_text(plain())
+    results = copy_of(small, tmp_path / "out")
+    answer = mcstudy("run", study, "--out", results.path)
+    assert answer.code == 0, answer.err
+    assert re.search(r"Impact speed explains \d+ ± \d+ % of the variance of HIC15", answer.line)
+    assert "384 runs: 384 ok" in answer.line
+    assert str(results.path / "report.html") in answer.out
+    assert answer.err == ""
+    assert mcstudy("run", study, "--out", results.path, "--quiet").out == ""
+    shown = mcstudy("run", study, "--out", results.path, "--json")
+    content = json.loads(shown.out)
+    assert content == {
+        "folder": str(results.path),
+        "analysis": results.read_json("analysis.json"),
+    }
+    assert mcstudy("report", results.path).line == answer.line
+    assert mcstudy("report", results.path, "--quiet").out == ""
+    assert json.loads(mcstudy("report", results.path, "--json").out) == content
+
+
+def test_status_tells_how_far_it_is(small: ResultsFolder) -> None:
+    answer = mcstudy("status", small.path)
+    assert answer.code == 0
+    assert answer.out == "headform_sobol: 384 of 384 runs done (384 ok)\n"
+
+
+def test_status_never_has_more_done_than_there_are(
+    small: ResultsFolder, tmp_path: Path, fast: None
+) -> None:
+    results = ResultsFolder(tmp_path / "shrunk")
+    run_text(plain(128), results)
+    run_text(plain(64), results)
+    status = json.loads(mcstudy("status", results.path, "--json").out)
+    assert status["done"] <= status["total"]
+
+
+def test_from_python_a_study_file_gives_its_folder(
+    small: ResultsFolder, tmp_path: Path, fast: None
+) -> None:
+    study = tmp_path / "small.toml"
+    study.write_text(plain())
+    results = api.run_study(study, out=tmp_path / "out", workers=1)
+    assert digest(results.runs()) == digest(small.runs())
+    assert results.read_json("analysis.json") == small.read_json("analysis.json")
+
+
+# -- sentences --------------------------------------------------------------------------------
+
+
+def estimate(value: float, half: float) -> dict[str, float]:
+    return {"value": value, "low": value - half, "high": value + half}
+
+
+def made_up(
+    first: dict[str, tuple[float, float]],
+    total: dict[str, tuple[float, float]],
+    *,
+    unit: str = "1",
+    variance: float = 1e4,
+    noise_sd: float = 0.1,
+) -> dict[str, Any]:
+    return {
+        "unit": unit,
+        "base_points": 256,
+        "variance": variance,
+        "noise_sd": noise_sd,
+        "alone": estimate(
+            sum(value for value, _ in first.values()),
+            sum(half**2 for _, half in first.values()) ** 0.5,
+        ),
+        "first": {name: estimate(*pair) for name, pair in first.items()},
+        "total": {name: estimate(*pair) for name, pair in total.items()},
+    }
+
+
+def test_a_sentence_names_shares_largest_first_and_weak_factors() -> None:
+    entry = made_up(
+        {"gait_phase": (0.2, 0.03), "impact_speed": (0.5, 0.04), "age": (0.0, 0.02),
+         "dummy": (0.0, 0.0)},
+        {"gait_phase": (0.4, 0.04), "impact_speed": (0.6, 0.04), "age": (0.0, 0.001),
+         "dummy": (0.0, 0.0002)},
+    )  # fmt: skip
+    text = sobol_report.sentence("hic15", entry)
+    assert text.startswith(
+        "Impact speed explains 50 ± 4 % of the variance of HIC15, gait phase 20 ± 3 %."
+    )
+    assert "on their own explain 70 ± 5 %; the rest are interactions." in text
+    assert "gait phase (20 % alone, 40 % with interactions)" in text
+    assert "Not distinguishable from zero, even with interactions: age." in text
+    assert "chaos" not in text
+    assert not re.search(r"-0\b|nan|None", text)
+
+
+def test_a_sentence_says_where_chaos_is_and_in_which_unit() -> None:
+    entry = made_up(
+        {"impact_speed": (0.6, 0.04), "dummy": (0.0, 0.05)},
+        {"impact_speed": (0.95, 0.04), "dummy": (0.25, 0.03)},
+        unit="m", variance=4.0, noise_sd=1.0,
+    )  # fmt: skip
+    text = sobol_report.sentence("throw_distance", entry)
+    assert "interactions and chaos." in text
+    assert re.search(r"25 ± 3 % of the variance belongs to no input", text)
+    assert "1.0 m" in text
+
+
+def test_negative_estimates_are_no_negative_shares() -> None:
+    entry = made_up(
+        {"impact_speed": (-0.004, 0.02), "age": (-0.002, 0.02), "dummy": (0.0, 0.0)},
+        {"impact_speed": (0.5, 0.1), "age": (0.9, 0.05), "dummy": (0.0, 0.0001)},
+    )
+    text = sobol_report.sentence("wad", entry)
+    assert text.startswith("No factor on its own explains a share of the variance of wrap-around")
+    assert "clear of zero" in text
+    assert "-0 %" not in text
+    assert "on their own explain 0 ± 3 %" in text
+    assert "age (0 % alone, 90 % with interactions)" in text
+
+
+def test_a_constant_output_is_one_sentence() -> None:
+    entry = {"unit": "m", "base_points": 64, "variance": 0.0}
+    assert sobol_report.sentence("throw_distance", entry) == "Throw distance does not vary."
+
+
+def test_a_factor_is_not_both_clear_and_indistinguishable() -> None:
+    # Of a chaotic output every total index holds the noise floor; a first-order index does not.
+    entry = made_up(
+        {"impact_speed": (0.4, 0.03), "friction_body_car": (0.05, 0.02), "dummy": (0.0, 0.02)},
+        {"impact_speed": (0.8, 0.05), "friction_body_car": (0.36, 0.05), "dummy": (0.3, 0.04)},
+        unit="m",
+    )
+    text = sobol_report.sentence("throw_distance", entry)
+    weak = text.partition("Not distinguishable from zero")[2].partition(".")[0]
+    assert "friction body–car 5 ± 2 %" in text
+    assert "friction" not in weak
+
+
+def test_a_factor_that_only_carries_the_noise_floor_is_not_said_to_interact() -> None:
+    entry = made_up(
+        {"impact_speed": (0.6, 0.03), "age": (0.0, 0.02), "dummy": (0.0, 0.02)},
+        {"impact_speed": (0.95, 0.05), "age": (0.3, 0.05), "dummy": (0.3, 0.04)},
+        unit="m",
+    )
+    text = sobol_report.sentence("throw_distance", entry)
+    acting = text.partition("Most through interactions: ")[2].partition(".")[0]
+    assert "age" not in acting
+
+
+def test_no_interactions_are_claimed_where_no_total_index_shows_them() -> None:
+    entry = made_up(
+        {"impact_speed": (0.4, 0.3), "headform_mass": (0.3, 0.2), "dummy": (0.0, 0.0)},
+        {"impact_speed": (0.42, 0.2), "headform_mass": (0.3, 0.1), "dummy": (0.0, 0.0)},
+    )
+    text = sobol_report.sentence("hic15", entry)
+    assert "on their own explain 70 ± 36 %; interactions are not distinguishable" in text
+    assert "the rest are interactions." not in text
+
+
+def test_the_change_by_a_nudge_is_that_of_two_runs(folder: ResultsFolder) -> None:
+    runs = folder.runs()
+    values = runs["hic15"].to_numpy().reshape(128, 10)
+    change = np.sqrt(np.mean((values[:, 4] - values[:, 0]) ** 2))
+    analysis = folder.read_json("analysis.json")
+    # Two runs with nudges of their own differ by sqrt(2) times the scatter that a nudge gives.
+    scatter = analysis["outputs"]["hic15"]["noise_sd"]
+    assert change == pytest.approx(np.sqrt(2.0) * scatter, rel=1e-9)
+
+
+def test_too_few_base_points_are_a_study_error(small: ResultsFolder, tmp_path: Path) -> None:
+    runs = small.runs()
+    runs.loc[runs["run"] % BLOCK == 1, "hic15"] = np.nan
+    runs.loc[runs["run"] % BLOCK == 4, "peak_force"] = np.nan
+    with pytest.raises(StudyError, match=r"too few of the 64 base points"):
+        api.build_report(copy_of(small, tmp_path / "lost", runs))
+
+
+def test_every_table_row_of_an_index_holds_two_intervals(folder: ResultsFolder) -> None:
+    html = (folder.path / "report.html").read_text()
+    row = re.search(r"<tr><td[^>]*>impact speed</td>(.*?)</tr>", html)
+    assert row is not None
+    cells = re.findall(r"<td[^>]*>(.*?)</td>", row.group(1))
+    assert len(cells) == 2
+    number = r"-?\d\.\d\d"
+    for cell in cells:
+        assert re.fullmatch(rf"{number} \({number} to {number}\)", cell)

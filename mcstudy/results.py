@@ -15,6 +15,7 @@
 import contextlib
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -129,6 +130,22 @@ class ResultsFolder:
         runs = pd.concat(frames, ignore_index=True).drop_duplicates("run")
         ordered: pd.DataFrame = runs.sort_values("run", ignore_index=True)
         return ordered
+
+    def progress(self) -> tuple[int, dict[str, int]]:
+        """Return how many runs of the design are done, in the folder or its cells, by status."""
+        inner = [ResultsFolder(file.parent) for file in self.path.glob("cells/*/manifest.json")]
+        if inner:
+            counts: Counter[str] = Counter()
+            for cell in inner:
+                counts.update(cell.progress()[1])
+        else:
+            runs = self.done()
+            if runs is None:
+                return 0, {}
+            # A folder may hold runs of an earlier, larger design.
+            n = int(self.read_json("manifest.json")["design"]["n"])
+            counts = Counter(runs["status"][runs["run"] < n].tolist())
+        return counts.total(), dict(counts.most_common())
 
     def runs(self) -> pd.DataFrame:
         """Return the table of runs.

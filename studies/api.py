@@ -18,7 +18,16 @@ from mcstudy.errors import UserError
 from mcstudy.report import Table
 from mcstudy.results import ResultsFolder
 from models.protocol import Run
-from studies import monte_carlo, monte_carlo_report, morris, morris_report, sobol, sobol_report
+from studies import (
+    injury,
+    injury_report,
+    monte_carlo,
+    monte_carlo_report,
+    morris,
+    morris_report,
+    sobol,
+    sobol_report,
+)
 from studies.execution import load_study_model
 from studies.reconstruction import Comparison, reconstruct, write_reconstruction
 
@@ -45,6 +54,7 @@ PIPELINES = {
     ),
     "sobol": Pipeline(sobol.run_sobol, sobol.build_report, sobol_report.summarise),
     "morris": Pipeline(morris.run_morris, morris.build_report, morris_report.summarise),
+    "injury": Pipeline(injury.run_injury, injury.build_report, injury_report.summarise),
 }
 """A new kind of study is its modules, its class in ``mcstudy.schema`` and one line here."""
 

@@ -1,0 +1,84 @@
+"""A limit as a classifier of injury: how well HIC 700 tells who is hurt.
+
+Outcomes are probabilities, not drawn cases: each run counts as injured with its risk and as
+uninjured with the rest, which leaves the chance of drawing out of the numbers.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What a limit does.
+
+    Attributes
+    ----------
+    value : of the stimulus. sensitivity : share of the injured above it. specificity : share of
+    the uninjured below it. positive, negative : predictive values, the risk above the limit and the
+    share of uninjured below it; NaN where nobody is.
+    """
+
+    value: float
+    sensitivity: float
+    specificity: float
+    positive: float
+    negative: float
+
+
+@dataclass(frozen=True)
+class Roc:
+    """Receiver operating characteristic: sensitivity over 1 - specificity, and its area."""
+
+    false_alarm: Array
+    sensitivity: Array
+    limit: Array
+    area: float
+    best: float
+
+
+def judge_limit(stimulus: Array, risk: Array, limit: float) -> Limit:
+    """Return sensitivity, specificity and predictive values of a limit.
+
+    Parameters
+    ----------
+    stimulus : (n,), NaN counts as below. risk : (n,) of injury. limit : of the stimulus.
+    """
+    above = np.nan_to_num(stimulus, nan=-np.inf) > limit
+    injured, uninjured = float(risk.sum()), float((1.0 - risk).sum())
+    hit, spared = float(risk[above].sum()), float((1.0 - risk)[~above].sum())
+    count = float(above.sum())
+    return Limit(
+        value=limit,
+        sensitivity=_share(hit, injured),
+        specificity=_share(spared, uninjured),
+        positive=_share(hit, count),
+        negative=_share(spared, risk.size - count),
+    )
+
+
+def receiver_operating_characteristic(stimulus: Array, risk: Array) -> Roc:
+    """Return the curve over all limits, the area below it and the best limit (Youden's J).
+
+    Parameters
+    ----------
+    stimulus : (n,), NaN counts as lowest. risk : (n,) of injury, neither all 0 nor all 1.
+    """
+    held = np.nan_to_num(stimulus, nan=-np.inf)
+    order = np.argsort(-held, kind="stable")
+    x, p = held[order], risk[order]
+    # Runs of the same stimulus pass together.
+    last = np.append(np.flatnonzero(np.diff(x) != 0.0), x.size - 1)
+    hits = np.concatenate([[0.0], np.cumsum(p)[last] / p.sum()])
+    alarms = np.concatenate([[0.0], np.cumsum(1.0 - p)[last] / (1.0 - p).sum()])
+    limits = np.concatenate([[np.inf], x[last]])
+    best = int(np.argmax(hits - alarms))
+    return Roc(alarms, hits, limits, float(np.trapezoid(hits, alarms)), float(limits[best]))
+
+
+def _share(part: float, whole: float) -> float:
+    return part / whole if whole > 0.0 else float("nan")

@@ -1,0 +1,148 @@
+"""Injury-risk curves fitted to a table of cases, a user's or a study's."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from mcstudy.errors import UserError
+from mcstudy.figures import risk, style
+from mcstudy.injury.cases import observations_of, read_table
+from mcstudy.injury.risk_curve import INFLUENTIAL, describe_risk
+from mcstudy.report import Section, Table, render
+from mcstudy.results import ResultsFolder
+from mcstudy.text import interval, number
+
+CASES = "cases.parquet"
+"""What an injury study leaves for this in its folder."""
+
+
+def fit_risk_curves(
+    source: Path,
+    stimulus: str,
+    folder: ResultsFolder,
+    *,
+    level: int = 3,
+    scenario: str | None = None,
+) -> dict[str, Any]:
+    """Fit injury-risk curves to cases and write a report of them.
+
+    Parameters
+    ----------
+    source : CSV or Parquet table of cases, or the folder of an injury study.
+    stimulus : column.
+    folder : where the report goes.
+    level : AIS from which a case counts as injured, where the table has a column ``ais``.
+    scenario : of an injury study; by default all.
+
+    Returns
+    -------
+    dict
+        The analysis, as in ``analysis.json``.
+
+    Raises
+    ------
+    UserError
+        If the table is wrong or allows no curve.
+    """
+    table = read_table(source / CASES if source.is_dir() else source)
+    if scenario is not None:
+        if "scenario" not in table.columns or scenario not in set(table["scenario"]):
+            raise UserError(f"{source}: has no scenario {scenario!r}")
+        table = table[table["scenario"] == scenario]
+    if source.is_dir() and stimulus in table.columns:
+        # A blow that did not happen is no case.
+        table = table[table[stimulus].notna()]
+    observations = observations_of(table.reset_index(drop=True), stimulus, level, str(source))
+    try:
+        found = describe_risk(observations)
+    except ValueError as error:
+        raise UserError(f"{source}: {error}") from None
+    injury = f"AIS{level}+" if "injured" not in table.columns else "injury"
+    with folder.open_for_writing():
+        folder.write_json(
+            "analysis.json",
+            {"source": str(source), "stimulus": stimulus, "injury": injury} | found,
+        )
+        analysis = folder.read_json("analysis.json")
+        figure = risk.draw_risk_curve(analysis, style.words(stimulus), f"risk of {injury}")
+        style.save({"risk_curve": figure}, folder.path / "figures")
+        subtitle = f"{analysis['cases']:,} cases of {source.name}, {analysis['injured']:,} injured"
+        section = Section(
+            "Risk curve", summarise(analysis), tables(analysis),
+            {"Risk with its 95 % band, the cases, the estimate without a family, and the stimuli "
+             "at 5, 25 and 50 % risk.": figure},
+        )  # fmt: skip
+        how = Section("How the curve was fitted", _method(analysis))
+        title = f"Risk of {injury} against {style.words(stimulus)}"
+        folder.write_text("report.html", render(title, subtitle, [section, how]))
+    return analysis
+
+
+def summarise(analysis: Mapping[str, Any]) -> list[str]:
+    """Return the result in words."""
+    half = analysis["at"]["0.5"]
+    lines = [
+        f"Half of the people are injured ({analysis['injury']}) at "
+        f"{style.words(analysis['stimulus'])} {interval(half)}, one in four at "
+        f"{interval(analysis['at']['0.25'])}, one in twenty at {interval(analysis['at']['0.05'])} "
+        f"({analysis['family']}, {analysis['cases']:,} cases, {analysis['injured']:,} injured)."
+    ]
+    influence = analysis["influence"]
+    if influence is not None and influence["influential"]:
+        worst = influence["largest"][0]
+        moved = (
+            "leaves no curve"
+            if worst["shift"] is None
+            else f"moves the median by {number(abs(worst['shift']), 2)} standard errors"
+        )
+        lines.append(
+            f"{influence['influential']} case(s) carry the curve: leaving out case "
+            f"{worst['case']} {moved}."
+        )
+    return lines
+
+
+def tables(analysis: Mapping[str, Any]) -> list[Table]:
+    """Return quality of the best curve and comparison of the families."""
+    points = [
+        [f"{100 * float(p):g} %", interval(entry), number(entry["quality_index"], 2),
+         entry["quality"]]
+        for p, entry in analysis["at"].items()
+    ]  # fmt: skip
+    families = [
+        [name, number(entry["aic"], 5), number(entry["log_likelihood"], 5),
+         number(entry["median"]), number(entry["intercept"], 4), number(entry["slope"], 4)]
+        for name, entry in analysis["families"].items()
+    ]  # fmt: skip
+    return [
+        Table(
+            f"{analysis['family']} curve: stimulus at three risks, and its quality index.",
+            ["risk", "stimulus (95 %)", "quality index", "class"],
+            points,
+        ),
+        Table(
+            "Families, best first.",
+            ["family", "AIC", "log likelihood", "median", "intercept", "slope in ln x"],
+            families,
+        ),
+    ]
+
+
+def _method(analysis: Mapping[str, Any]) -> list[str]:
+    exact = analysis["exact"]
+    lines = [
+        "Survival analysis as in ISO/TS 18506: injured cases are left-censored, uninjured ones "
+        f"right-censored{f', {exact} exact' if exact else ''}; Weibull, log-normal and "
+        "log-logistic curves by greatest likelihood, the one with the smallest AIC is drawn. With "
+        "few cases the AIC hardly tells the families apart: see how far their medians lie from "
+        "each other.",
+        "The band is normal on the scale of the linear predictor. The quality index is the width "
+        "of the 95 % interval of the stimulus over the stimulus: up to 0.5 good, 1 fair, 1.5 "
+        "marginal, above unacceptable.",
+    ]
+    if analysis["influence"] is not None:
+        lines.append(
+            "Each case was left out once; one counts as carrying the curve if the median moves by "
+            f"more than {INFLUENTIAL:g} standard error."
+        )
+    return lines

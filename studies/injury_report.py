@@ -29,7 +29,7 @@ def draw(
     reference = cases[cases["scenario"] == REFERENCE]
     bars = {entry["title"]: entry["ais"] for entry in scenarios.values()}
     bars |= {
-        f"{words}, alone": shares
+        f"{style.words(words)}, alone": shares
         for words, shares in scenarios[REFERENCE]["mechanisms"].items()
         if len(study.mechanisms) > 1
     }
@@ -226,8 +226,9 @@ def _observed_said(analysis: Mapping[str, Any]) -> list[str]:
             f"{100.0 * value:.0f} % by {analysis['functions'][name]['title']}"
             for name, value in entry["by_function"].items()
         )
+        label = entry["label"][0].upper() + entry["label"][1:]
         lines.append(
-            f"{entry['label'][0].upper() + entry['label'][1:]} (AIS {entry['level']}): its probability was "
+            f"{label} (AIS {entry['level']}): its probability was "
             f"{percent(entry['probability'])}; over nine runs in ten it lies between "
             f"{100.0 * low:.0f} and {100.0 * high:.0f} %. By risk function: {by}."
         )
@@ -270,7 +271,7 @@ def _judged(analysis: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     """Return the limit's judgements by scenario and what it is held against."""
     level = analysis["limit"]["level"]
     return {
-        f"AIS {level}+ {words}, {entry['title']}": judged
+        f"AIS {level}+ {style.words(words)}, {entry['title']}": judged
         for entry in analysis["scenarios"].values()
         for words, judged in entry["limit"].items()
         if judged

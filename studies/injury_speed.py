@@ -10,14 +10,18 @@ from scipy import optimize
 
 from mcstudy import seeds
 from mcstudy.config import InjuryStudy
+from mcstudy.figures.style import words
 from studies.injury_cells import REFERENCE
 
 Array = NDArray[np.float64]
 
 SPEED = "impact_speed"
 BINS = 24
-"""Parts of equal counts along the speed (assumed)."""
+"""Parts of equal width along the speed, between its outermost hundredths (assumed)."""
+FEWEST_IN_BIN = 10
 RESAMPLES = 400
+HEAD_LEVELS = (2, 3, 5)
+"""AIS levels of the head that are followed."""
 FEWEST = 240
 """Runs below which no curve is drawn (assumed)."""
 
@@ -53,7 +57,8 @@ def describe_speed(
         return None
     wanted = _wanted(study, held)
     speed = 3.6 * held[SPEED].to_numpy(dtype=float)
-    edges = np.quantile(speed, np.linspace(0.0, 1.0, BINS + 1))
+    slowest, fastest = (float(v) for v in np.quantile(speed, [0.01, 0.99]))
+    edges = np.linspace(slowest, fastest, BINS + 1)
     place = np.clip(np.searchsorted(edges, speed, side="right") - 1, 0, BINS - 1)
     size = study.design.size if study.design.size > 1 else max(1, study.design.n // 20)
     batch = held["run"].to_numpy() // size
@@ -63,6 +68,8 @@ def describe_speed(
     weights, speeds = np.zeros(cells), np.zeros(cells)
     np.add.at(weights, (batch, place), weight)
     np.add.at(speeds, (batch, place), weight * speed)
+    filled = np.bincount(place, minlength=BINS) >= FEWEST_IN_BIN
+    weights, speeds = weights[:, filled], speeds[:, filled]
     middle = speeds.sum(axis=0) / weights.sum(axis=0)
     reference = (held["scenario"] == REFERENCE).to_numpy()
     rng = seeds.generator(study.seed, seeds.BOOTSTRAP, 1)
@@ -71,6 +78,7 @@ def describe_speed(
     for name, risk in wanted.items():
         sums = np.zeros(cells)
         np.add.at(sums, (batch, place), weight * risk)
+        sums = sums[:, filled]
         now = float(np.average(risk[reference], weights=weight[reference]))
         curve = _curve(sums, weights, np.arange(cells[0]))
         resampled = np.stack([_curve(sums, weights, draw) for draw in draws])
@@ -95,13 +103,13 @@ def _wanted(study: InjuryStudy, held: pd.DataFrame) -> dict[str, Array]:
     limit = study.limit
     risks = {
         f"AIS{level}+ head": held[f"risk_head_ais{level}"].to_numpy(dtype=float)
-        for level in (2, 3, 4, 5)
+        for level in HEAD_LEVELS
     }
     for item in study.observed:
-        name = f"{item.label} (AIS{item.level}+ {item.mechanism})"
+        name = f"{item.label} (AIS{item.level}+ {words(item.mechanism)})"
         risks[name] = held[f"risk_{item.mechanism}_ais{item.level}"].to_numpy(dtype=float)
     above = held[limit.output].to_numpy(dtype=float) > limit.value
-    risks[f"{limit.output} above {limit.value:g}"] = above.astype(float)
+    risks[f"{words(limit.output)} above {limit.value:g}"] = above.astype(float)
     return risks
 
 

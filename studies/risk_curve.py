@@ -4,13 +4,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
+from mcstudy import units
+from mcstudy.config import InjuryStudy, load_study
 from mcstudy.errors import UserError
 from mcstudy.figures import risk, style
 from mcstudy.injury.cases import observations_of, read_table
 from mcstudy.injury.risk_curve import INFLUENTIAL, describe_risk
 from mcstudy.report import Section, Table, render
 from mcstudy.results import ResultsFolder
-from mcstudy.text import interval, number
+from mcstudy.text import interval, number, unit
+from studies.execution import load_study_model
 
 CASES = "cases.parquet"
 """What an injury study leaves for this in its folder."""
@@ -44,14 +49,11 @@ def fit_risk_curves(
     UserError
         If the table is wrong or allows no curve.
     """
-    table = read_table(source / CASES if source.is_dir() else source)
+    table, named = _read(source, stimulus)
     if scenario is not None:
         if "scenario" not in table.columns or scenario not in set(table["scenario"]):
             raise UserError(f"{source}: has no scenario {scenario!r}")
         table = table[table["scenario"] == scenario]
-    if source.is_dir() and stimulus in table.columns:
-        # A blow that did not happen is no case.
-        table = table[table[stimulus].notna()]
     observations = observations_of(table.reset_index(drop=True), stimulus, level, str(source))
     try:
         found = describe_risk(observations)
@@ -61,10 +63,11 @@ def fit_risk_curves(
     with folder.open_for_writing():
         folder.write_json(
             "analysis.json",
-            {"source": str(source), "stimulus": stimulus, "injury": injury} | found,
+            {"source": str(source), "stimulus": stimulus, "unit": named, "injury": injury} | found,
         )
         analysis = folder.read_json("analysis.json")
-        figure = risk.draw_risk_curve(analysis, style.words(stimulus), f"risk of {injury}")
+        xlabel = style.words(stimulus) if named is None else style.label(stimulus, named)
+        figure = risk.draw_risk_curve(analysis, xlabel, f"risk of {injury}")
         style.save({"risk_curve": figure}, folder.path / "figures")
         subtitle = f"{analysis['cases']:,} cases of {source.name}, {analysis['injured']:,} injured"
         section = Section(
@@ -78,14 +81,38 @@ def fit_risk_curves(
     return analysis
 
 
+def _read(source: Path, stimulus: str) -> tuple[pd.DataFrame, str | None]:
+    """Return the table of cases, and the unit of the stimulus where a study tells it."""
+    if not source.is_dir():
+        return read_table(source), None
+    study = load_study(source / "study.toml")
+    table = read_table(source / CASES)
+    model = load_study_model(study)
+    known = {item.name: item.unit for item in model.inputs}
+    known |= {item.name: item.unit for item in model.outputs}
+    if stimulus not in known:
+        return table, None
+    named = known[stimulus]
+    if isinstance(study, InjuryStudy) and stimulus in study.inputs:
+        # People read an input in the unit that the study file gives it in.
+        shown = study.inputs[stimulus].unit
+        table[stimulus] /= units.factor(shown, named)
+        named = shown
+    # A blow that did not happen is no case.
+    return table[table[stimulus].notna()], named
+
+
 def summarise(analysis: Mapping[str, Any]) -> list[str]:
     """Return the result in words."""
-    half = analysis["at"]["0.5"]
+    unit_text = f" {unit(analysis['unit'])}".rstrip() if analysis["unit"] else ""
+    half, quarter, few = (
+        f"{interval(analysis['at'][p])}{unit_text}" for p in ("0.5", "0.25", "0.05")
+    )
     lines = [
         f"Half of the people are injured ({analysis['injury']}) at "
-        f"{style.words(analysis['stimulus'])} {interval(half)}, one in four at "
-        f"{interval(analysis['at']['0.25'])}, one in twenty at {interval(analysis['at']['0.05'])} "
-        f"({analysis['family']}, {analysis['cases']:,} cases, {analysis['injured']:,} injured)."
+        f"{style.words(analysis['stimulus'])} {half}, one in four at {quarter}, one in twenty at "
+        f"{few} ({analysis['family']} curve, {analysis['cases']:,} cases, "
+        f"{analysis['injured']:,} injured)."
     ]
     influence = analysis["influence"]
     if influence is not None and influence["influential"]:

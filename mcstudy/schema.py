@@ -274,6 +274,10 @@ class Limit(StudyTable):
     level: Annotated[int, Field(ge=1, le=6)] = 3
 
 
+REFERENCE = "reference"
+"""The scenario of an injury study that changes nothing."""
+
+
 class InjuryStudy(CommonStudy):
     """``kind = "injury"``: from runs to AIS outcomes, for scenarios and car fronts."""
 
@@ -294,6 +298,8 @@ class InjuryStudy(CommonStudy):
     def _consistent(self) -> "InjuryStudy":
         for name in [*self.fronts, *self.scenarios]:
             _check_folder_name(name)
+        if REFERENCE in self.scenarios:
+            raise ValueError(f"scenarios.{REFERENCE}: this name is the study's as it stands")
         for name, scenario in self.scenarios.items():
             for key in scenario.inputs:
                 if key not in self.inputs:

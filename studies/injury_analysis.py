@@ -13,9 +13,10 @@ from mcstudy.injury.ais import LEVELS, Mechanism, combine, distribution, draw_ai
 from mcstudy.injury.association import fit_proportional_odds, rank_correlations
 from mcstudy.injury.classifier import judge_limit, receiver_operating_characteristic
 from mcstudy.injury.functions import RiskFunction
+from mcstudy.schema import REFERENCE
 from mcstudy.statistics import Estimate, between_replicates
 from models.protocol import Model
-from studies.injury_cells import REFERENCE, fronts_of
+from studies.injury_cells import fronts_of
 from studies.injury_speed import describe_speed
 
 Array = NDArray[np.float64]
@@ -110,7 +111,7 @@ def population(
     ----------
     part : runs of one scenario. values : (n,) of each. shares : of the fronts, adding up to one.
     """
-    by_batch = _by_batch(study, part, values, shares)
+    by_batch = np.asarray(_by_batch(study, part, values, shares), dtype=float)
     return _within_bounds(between_replicates(by_batch, _mean(part, values, shares)))
 
 
@@ -127,14 +128,14 @@ def _mean(part: pd.DataFrame, values: Array, shares: Mapping[str, float]) -> flo
 
 def _by_batch(
     study: InjuryStudy, part: pd.DataFrame, values: Array, shares: Mapping[str, float]
-) -> Array:
-    """Return the estimate of each independent part of the design."""
+) -> "pd.Series[float]":
+    """Return the estimate of each independent part of the design that has runs of every front."""
     run = part["run"].to_numpy()
     size = study.design.size if study.design.size > 1 else max(1, study.design.n // BATCHES)
     table = pd.DataFrame({"batch": run // size, "front": part["front"].to_numpy(), "value": values})
     means = table.groupby(["batch", "front"])["value"].mean().unstack("front")
     weights = pd.Series(shares)
-    return np.asarray((means[list(weights.index)] * weights).sum(axis=1), dtype=float)
+    return (means[list(weights.index)] * weights).sum(axis=1, skipna=False).dropna()
 
 
 def _head(part: pd.DataFrame, level: int) -> Array:
@@ -175,8 +176,8 @@ def _differences(
     for level in LEVELS:
         batches = [_by_batch(study, p, _head(p, level), shares) for p in (part, reference)]
         centre = [_mean(p, _head(p, level), shares) for p in (part, reference)]
-        count = min(b.size for b in batches)
-        change = between_replicates(batches[0][:count] - batches[1][:count], centre[0] - centre[1])
+        apart = np.asarray((batches[0] - batches[1]).dropna(), dtype=float)
+        change = between_replicates(apart, centre[0] - centre[1])
         found[str(level)] = change.as_dict() | {"relative": centre[0] / centre[1] - 1.0}
     return found
 

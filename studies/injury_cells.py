@@ -5,10 +5,7 @@ from dataclasses import dataclass
 
 from mcstudy.config import InjuryStudy, MonteCarloStudy
 from mcstudy.results import ResultsFolder
-from mcstudy.schema import Front, Report, Scenario
-
-REFERENCE = "reference"
-"""The scenario that changes nothing."""
+from mcstudy.schema import REFERENCE, Front, Report, Scenario
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from mcstudy.config import InjuryStudy
 from mcstudy.figures import risk, style
 from mcstudy.injury.functions import RiskFunction, speed_curves
 from mcstudy.report import Section, Table
+from mcstudy.schema import REFERENCE
 from mcstudy.text import interval, number, percent
 from studies.injury_analysis import ages_of
-from studies.injury_cells import REFERENCE
 
 FEW = 1000.0
 """Impacts that counts of injured are given for."""

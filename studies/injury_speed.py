@@ -11,7 +11,7 @@ from scipy import optimize
 from mcstudy import seeds
 from mcstudy.config import InjuryStudy
 from mcstudy.figures.style import words
-from studies.injury_cells import REFERENCE
+from mcstudy.schema import REFERENCE
 
 Array = NDArray[np.float64]
 

@@ -49,8 +49,9 @@ def _draw_lines(axes: Axes, points: Mapping[str, Mapping[str, Any]]) -> None:
     for risk, entry in points.items():
         p, at = float(risk), float(entry["value"])
         axes.plot([0.0, at, at], [p, p, -0.06], color=style.GREY, linewidth=0.8, linestyle=":")
-        axes.text(at, -0.055, f" {at:,.0f}" if at >= 10 else f" {at:.2g}", fontsize=7,
-                  color=style.GREY, va="bottom")  # fmt: skip
+        shown = f"{at:,.0f}" if at >= 10 else f"{at:.2g}"
+        axes.annotate(f"{100 * p:g} %: {shown}", (0.0, p), xytext=(4, 2), fontsize=8,
+                      textcoords="offset points", color=style.GREY)  # fmt: skip
 
 
 def _draw_rug(axes: Axes, rug: Mapping[str, Sequence[Any]]) -> None:

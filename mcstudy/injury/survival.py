@@ -22,7 +22,7 @@ from mcstudy.injury.observations import Observations, check
 
 Array = NDArray[np.float64]
 
-FAMILIES = ("log-normal", "log-logistic", "weibull")
+FAMILIES = ("log-normal", "log-logistic", "Weibull")
 QUALITY_AT = (0.05, 0.25, 0.5)
 """Risks at which the quality index is given (ISO/TS 18506)."""
 QUALITY_CLASSES = ((0.5, "good"), (1.0, "fair"), (1.5, "marginal"), (np.inf, "unacceptable"))

@@ -103,7 +103,8 @@ def sections_of(
             "Outcomes", summarise(analysis), _outcome_tables(analysis),
             one("ais", "Distribution of the AIS of the head, by scenario and by mechanism."),
         ),
-        Section("The injuries of the case", _observed_said(analysis), _halved_tables(analysis)),
+        Section("Observed injuries, and the speed that would have halved the risk",
+                _observed_said(analysis), _halved_tables(analysis)),
         Section(
             "The choice of the risk function",
             ("Which published function is right nobody knows; the choice is an uncertain input. "

@@ -144,7 +144,7 @@ def draw_ais(shares: Mapping[str, Sequence[float]]) -> Figure:
             axes.barh(places, table[:, level], 0.7, left=left, color=colour, edgecolor="white",
                       linewidth=0.6, label=f"AIS {level}")  # fmt: skip
             for place, start, width in zip(places, left, table[:, level], strict=True):
-                if width > 0.045:
+                if width > 0.06:
                     colour = "black" if level in (0, 1, 3) else "white"
                     axes.text(start + width / 2, place, f"{100 * width:.0f} %", fontsize=7,
                               ha="center", va="center", color=colour)  # fmt: skip

@@ -120,7 +120,7 @@ def summarise(analysis: Mapping[str, Any]) -> list[str]:
         moved = (
             "leaves no curve"
             if worst["shift"] is None
-            else f"moves the median by {number(abs(worst['shift']), 2)} standard errors"
+            else f"moves it by {number(abs(worst['shift']), 2)} standard errors"
         )
         lines.append(
             f"{influence['influential']} case(s) carry the curve: leaving out case "
@@ -169,7 +169,7 @@ def _method(analysis: Mapping[str, Any]) -> list[str]:
     ]
     if analysis["influence"] is not None:
         lines.append(
-            "Each case was left out once; one counts as carrying the curve if the median moves by "
-            f"more than {INFLUENTIAL:g} standard error."
+            "Each case was left out once; one counts as carrying the curve if the stimulus at 5, "
+            f"25 or 50 % risk moves by more than {INFLUENTIAL:g} standard error."
         )
     return lines

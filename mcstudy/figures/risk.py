@@ -199,14 +199,15 @@ def draw_exceedance(samples: Mapping[str, Array], words: str, limit: float) -> F
         largest = 0.0
         for k, (label, sample) in enumerate(samples.items()):
             held = np.sort(sample[np.isfinite(sample)])
-            share = np.arange(held.size, 0, -1) / sample.size
+            share = np.arange(held.size, -1, -1) / sample.size
+            held = np.concatenate([[0.0], held])
             # Dvoretzky, Kiefer and Wolfowitz: for the whole curve at once.
             reach = float(np.sqrt(np.log(2.0 / 0.05) / (2.0 * sample.size)))
             colour = style.PALETTE[k % len(style.PALETTE)]
             axes.fill_between(held, np.clip(share - reach, 0, 1), np.clip(share + reach, 0, 1),
                               step="post", color=colour, alpha=0.18, linewidth=0)  # fmt: skip
             axes.step(held, share, where="post", color=colour, label=label)
-            largest = max(largest, float(np.quantile(held, 0.995))) if held.size else largest
+            largest = max(largest, float(np.quantile(held, 0.995)))
         axes.axvline(limit, color="black", linewidth=1.0, linestyle="--", label=f"limit {limit:g}")
         axes.set(xlim=(0.0, 1.05 * max(largest, limit)), ylim=(0.0, 1.0))
         axes.set_xlabel(f"{words} [–]")

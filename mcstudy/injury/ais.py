@@ -52,8 +52,9 @@ def exceedance(function: RiskFunction, stimulus: Array, age: Array) -> Array:
 def mix(mechanism: Mechanism, outputs: Mapping[str, Array], age: Array) -> Array:
     """Return P(AIS >= k) of a mechanism, its risk functions weighted, shape (n, 6).
 
-    Every level is the weighted mean of the functions that have it. Below the lowest known level the
-    risk is that of the lowest, above the highest it is zero; it never rises with the level.
+    Every level is the weighted mean of the functions that have it, but never more than the level
+    below, which other functions may have. A level that none has takes the risk of the next worse
+    one that some have, or zero above them all.
 
     Parameters
     ----------
@@ -67,7 +68,10 @@ def mix(mechanism: Mechanism, outputs: Mapping[str, Array], age: Array) -> Array
         total[:, known] += weight * found[:, known]
         weights[known] += weight
     mean = total / np.where(weights > 0.0, weights, 1.0)
-    return np.asarray(np.maximum.accumulate(mean[:, ::-1], axis=1)[:, ::-1])
+    for k in reversed(range(HIGHEST_LEVEL - 1)):
+        if weights[k] == 0.0:
+            mean[:, k] = mean[:, k + 1]
+    return np.asarray(np.minimum.accumulate(mean, axis=1))
 
 
 def combine(

@@ -12,6 +12,8 @@ from mcstudy.statistics import Estimate
 Array = NDArray[np.float64]
 
 RESAMPLES = 200
+STEEPEST = 50.0
+"""Slope per standard deviation that no data with overlap give (assumed)."""
 _REACH = float(stats.norm.ppf(0.975))
 
 
@@ -25,9 +27,18 @@ def rank_correlations(
     Parameters
     ----------
     values : (n,) finite. levels : (n,). rng : of the resamples.
+
+    Raises
+    ------
+    ValueError
+        If all levels are the same.
     """
+    if np.unique(levels).size < 2:
+        raise ValueError("all outcomes are the same")
     found = {}
-    parts = [rng.integers(0, values.size, values.size) for _ in range(RESAMPLES)]
+    drawn = (rng.integers(0, values.size, values.size) for _ in range(RESAMPLES))
+    # A resample of one outcome alone has no correlation.
+    parts = [part for part in drawn if np.unique(levels[part]).size > 1]
     for name, measure in (("spearman", _spearman), ("kendall", _kendall)):
         value = measure(values, levels)
         scores = _fisher(np.array([measure(values[part], levels[part]) for part in parts]))
@@ -69,6 +80,8 @@ class OrdinalFit:
 
     def odds_ratio(self, name: str) -> Estimate:
         """Return by what a standard deviation of a predictor multiplies the odds of a worse AIS."""
+        if name not in self.names:
+            raise ValueError(f"{name!r} is no predictor, only {', '.join(self.names)}")
         k = self.names.index(name)
         slope, reach = self.slopes[k], _REACH * self.errors[k]
         return Estimate(*(float(np.exp(slope + s * reach)) for s in (0.0, -1.0, 1.0)))
@@ -84,11 +97,15 @@ def fit_proportional_odds(predictors: Mapping[str, Array], levels: NDArray[np.in
     Raises
     ------
     ValueError
-        If all levels are the same, a predictor does not vary, or predictors repeat each other.
+        If all levels are the same, a predictor does not vary or is not finite, predictors repeat
+        each other, or they tell the levels apart completely.
     """
     names = tuple(predictors)
-    table = np.stack([np.asarray(predictors[name], dtype=float) for name in names], axis=1)
-    constant = [name for name, sd in zip(names, table.std(axis=0), strict=True) if sd == 0.0]
+    columns = [np.asarray(predictors[name], dtype=float) for name in names]
+    if not names or not np.all(np.isfinite(columns)):
+        raise ValueError("predictors must be finite, one at least")
+    table = np.stack(columns, axis=1)
+    constant = [name for name, span in zip(names, np.ptp(table, axis=0), strict=True) if not span]
     if constant:
         raise ValueError(f"{', '.join(constant)} does not vary")
     classes, codes = np.unique(levels, return_inverse=True)
@@ -105,6 +122,8 @@ def fit_proportional_odds(predictors: Mapping[str, Array], levels: NDArray[np.in
         _ordinal_loss, start, args=(z, codes), jac=True, method="BFGS", options={"gtol": 1e-7}
     )
     p = len(names)
+    if np.abs(found.x[:p]).max() > STEEPEST:
+        raise ValueError("the predictors separate the outcomes completely: any slope fits")
     hessian = _numeric_hessian(found.x, z, codes)
     errors = np.sqrt(np.diag(np.linalg.pinv(hessian))[:p])
     null = np.concatenate([np.zeros(p), start[p:]])

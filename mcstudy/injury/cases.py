@@ -52,7 +52,7 @@ def observations_of(table: pd.DataFrame, stimulus: str, level: int, source: str)
         if "injured" in table.columns:
             injured = _flags(table, "injured")
         elif "ais" in table.columns:
-            injured = _numbers(table, "ais") >= level
+            injured = _levels(table) >= level
         else:
             raise ValueError("has neither a column 'injured' nor 'ais'")
         return observe(
@@ -71,6 +71,17 @@ def _numbers(table: pd.DataFrame, column: str) -> NDArray[np.float64]:
     if wrong.size:
         shown = str(table[column].iloc[int(wrong[0])])[:40]
         raise ValueError(f"column {column!r}, case {wrong[0] + 1}: {shown!r} is no number")
+    return values
+
+
+def _levels(table: pd.DataFrame) -> NDArray[np.float64]:
+    values = _numbers(table, "ais")
+    wrong = np.flatnonzero(~np.isin(values, range(7)))
+    if wrong.size:
+        raise ValueError(
+            f"column 'ais', case {wrong[0] + 1}: must be 0 to 6, given {values[wrong[0]]:g}; leave "
+            "out cases of unknown severity"
+        )
     return values
 
 

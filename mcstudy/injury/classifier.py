@@ -72,10 +72,12 @@ def receiver_operating_characteristic(stimulus: Array, risk: Array) -> Roc:
     order = np.argsort(-held, kind="stable")
     x, p = held[order], risk[order]
     # Runs of the same stimulus pass together.
-    last = np.append(np.flatnonzero(np.diff(x) != 0.0), x.size - 1)
+    last = np.append(np.flatnonzero(x[1:] != x[:-1]), x.size - 1)
     hits = np.concatenate([[0.0], np.cumsum(p)[last] / p.sum()])
     alarms = np.concatenate([[0.0], np.cumsum(1.0 - p)[last] / (1.0 - p).sum()])
-    limits = np.concatenate([[np.inf], x[last]])
+    # A limit half-way to the next lower stimulus leaves just these above it.
+    below = np.append(x[last[:-1] + 1], -np.inf)
+    limits = np.concatenate([x[:1], np.where(np.isinf(below), below, 0.5 * (x[last] + below))])
     best = int(np.argmax(hits - alarms))
     return Roc(alarms, hits, limits, float(np.trapezoid(hits, alarms)), float(limits[best]))
 

@@ -22,7 +22,7 @@ def _logistic(x: Array, intercept: float, slope: float) -> Array:
 
 
 def _prasad_mertz(x: Array, c1: float, c2: float) -> Array:
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         return np.asarray(special.expit(-(c1 + 200.0 / x - c2 * x)))
 
 

@@ -84,13 +84,17 @@ def check(observations: Observations) -> Observations:
     Raises
     ------
     ValueError
-        If a stimulus is not a positive number, an interval is empty, all cases are injured or none
-        is, or the injured and the uninjured do not overlap.
+        If a stimulus is not a positive number, an interval is empty or open on both sides, there is
+        nothing but one class, or one stimulus fits all cases.
     """
     low, high = observations.low, observations.high
     for k in range(observations.size):
         # The open side of a censored case is no measurement.
         bounds = [b for b, open_side in ((low[k], 0.0), (high[k], np.inf)) if b != open_side]
+        if not bounds:
+            raise ValueError(
+                f"case {k + 1}: the stimulus must be a positive number, neither bound is one"
+            )
         if not all(np.isfinite(b) and b > 0.0 for b in bounds):
             raise ValueError(
                 f"case {k + 1}: the stimulus must be a positive number, given "
@@ -100,14 +104,14 @@ def check(observations: Observations) -> Observations:
             raise ValueError(f"case {k + 1}: the interval {low[k]:g} to {high[k]:g} is empty")
     if observations.size < 3:
         raise ValueError(f"{observations.size} cases are too few for a risk curve")
-    if observations.injured.all():
+    if np.all(low == 0.0):
         raise ValueError("all cases are injured: where risk begins cannot be told; add uninjured")
     if not observations.injured.any():
         raise ValueError("no case is injured: where risk begins cannot be told; add injured")
-    if not observations.exact.any() and high.min() >= low.max():
+    if high.min() >= low.max():
         raise ValueError(
             f"the uninjured (up to {low.max():g}) and the injured (from {high.min():g}) do not "
-            "overlap: any steepness fits (complete separation), so no curve is given; add cases "
-            "between or beyond them"
+            "overlap: one stimulus fits all cases with any steepness (complete separation), so no "
+            "curve is given; add cases between or beyond them"
         )
     return observations

@@ -9,6 +9,7 @@ from mcstudy.injury.observations import Observations
 from mcstudy.injury.survival import (
     FAMILIES,
     QUALITY_AT,
+    REACH,
     RiskFit,
     fit_risk_curve,
     quality_class,
@@ -78,11 +79,14 @@ def _at(fit: RiskFit, risk: float) -> dict[str, Any]:
 
 
 def _influence(observations: Observations, fit: RiskFit) -> dict[str, Any] | None:
-    """Return what leaving out a case does to the median, in its standard errors, largest first."""
+    """Return what leaving out a case does to the curve, largest first.
+
+    The shift is that of the stimulus at 5, 25 or 50 % risk, whichever moves most, in standard
+    errors of the curve without the case.
+    """
     if observations.size > MOST_REFITTED:
         return None
-    centre, low, high = np.log(fit.stimulus_at(0.5))
-    error = (high - low) / (2.0 * 1.959963984540054)
+    before = np.log([fit.stimulus_at(p)[0] for p in QUALITY_AT])
     shifts = np.full(observations.size, np.inf)
     for k in range(observations.size):
         try:
@@ -90,7 +94,9 @@ def _influence(observations: Observations, fit: RiskFit) -> dict[str, Any] | Non
         except ValueError:
             # Without this case there is no curve at all.
             continue
-        shifts[k] = (np.log(refitted.stimulus_at(0.5)[0]) - centre) / error
+        centre, low, high = np.log([refitted.stimulus_at(p) for p in QUALITY_AT]).T
+        moved = (centre - before) / ((high - low) / (2.0 * REACH))
+        shifts[k] = moved[np.argmax(np.abs(moved))]
     order = np.argsort(-np.abs(shifts))[:INFLUENCE_SHOWN]
     return {
         "largest": [{"case": int(k) + 1, "shift": float(shifts[k])} for k in order],

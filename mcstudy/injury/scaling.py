@@ -5,8 +5,8 @@
   [found]); 1 from 10 years on [assumed]; linear between.
 - ``brain_acceleration`` and ``brain_rate``: tolerance of angular acceleration goes with the brain's
   mass to the power -2/3, that of angular velocity with -1/3 (A. Ommaya et al. 1967 [recalled]).
-  Brain mass by age: 1.10 kg at 3 years [assumed], 1.25 at 7, 1.40 from 18 on [estimated]; linear
-  between.
+  Brain mass by age: 1.10 kg up to 3 years [assumed; an infant's is far less], 1.25 at 7, 1.40 from
+  18 on [estimated]; linear between.
 
 The BrIC is a ratio of angular velocities and goes with ``brain_rate``.
 """

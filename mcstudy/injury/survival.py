@@ -27,7 +27,8 @@ QUALITY_AT = (0.05, 0.25, 0.5)
 """Risks at which the quality index is given (ISO/TS 18506)."""
 QUALITY_CLASSES = ((0.5, "good"), (1.0, "fair"), (1.5, "marginal"), (np.inf, "unacceptable"))
 """Width of the interval over the stimulus, up to which a curve is called so (ISO/TS 18506)."""
-_REACH = float(stats.norm.ppf(0.975))
+REACH = float(stats.norm.ppf(0.975))
+"""Standard deviations of a 95 % normal interval."""
 
 
 @dataclass(frozen=True)
@@ -61,14 +62,14 @@ class RiskFit:
         y = np.log(stimulus)
         z = self.intercept + self.slope * y
         c = self.covariance
-        reach = _REACH * np.sqrt(c[0, 0] + 2.0 * c[0, 1] * y + c[1, 1] * y * y)
+        reach = REACH * np.sqrt(c[0, 0] + 2.0 * c[0, 1] * y + c[1, 1] * y * y)
         return _risk(self.family, z - reach), _risk(self.family, z + reach)
 
     def stimulus_at(self, risk: float) -> tuple[float, float, float]:
         """Return the stimulus of a risk with its 95 % interval, normal in ln x."""
         centre = (_score(self.family, risk) - self.intercept) / self.slope
         gradient = np.array([1.0, centre]) / self.slope
-        reach = _REACH * float(np.sqrt(gradient @ self.covariance @ gradient))
+        reach = REACH * float(np.sqrt(gradient @ self.covariance @ gradient))
         return (
             float(np.exp(centre)),
             float(np.exp(centre - reach)),
@@ -96,9 +97,11 @@ def fit_risk_curve(observations: Observations, family: str) -> RiskFit:
     Raises
     ------
     ValueError
-        If the observations allow no curve (see ``mcstudy.injury.observations.check``), or risk does
-        not rise with the stimulus.
+        If the family is unknown, the observations allow no curve (see
+        ``mcstudy.injury.observations.check``), or risk does not rise with the stimulus.
     """
+    if family not in FAMILIES:
+        raise ValueError(f"unknown family {family!r}, choose from {', '.join(FAMILIES)}")
     check(observations)
     with np.errstate(divide="ignore"):
         low, high = np.log(observations.low), np.log(observations.high)

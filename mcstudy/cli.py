@@ -3,6 +3,7 @@
 Exit codes: 0 done, 1 the study failed, 2 the user's input is wrong, 130 interrupted.
 """
 
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -148,10 +149,11 @@ def risk_curve(
     ],
     stimulus: Annotated[str, typer.Option(help="Column that the risk depends on.")],
     level: Annotated[
-        int, typer.Option(help="AIS that counts as injured, where the table has a column ais.")
+        int,
+        typer.Option(min=1, max=6, help="AIS that counts as injured, where there is a column ais."),
     ] = 3,
     scenario: Annotated[
-        str | None, typer.Option(help="Scenario of an injury study; by default all.")
+        str | None, typer.Option(help="Scenario of an injury study; by default as it stands.")
     ] = None,
     out: Out = None,
     quiet: Quiet = False,
@@ -161,7 +163,8 @@ def risk_curve(
     from mcstudy.results import ResultsFolder
     from studies import risk_curve
 
-    folder = ResultsFolder(out or Path("results") / f"risk_{cases.resolve().stem}_{stimulus}")
+    name = re.sub(r"[^A-Za-z0-9_-]+", "_", f"risk_{cases.resolve().stem}_{stimulus}")
+    folder = ResultsFolder(out or Path("results") / name)
     analysis = risk_curve.fit_risk_curves(cases, stimulus, folder, level=level, scenario=scenario)
     summary = [*risk_curve.summarise(analysis), *risk_curve.tables(analysis)]
     _print_analysis(analysis, summary, folder.path, quiet=quiet, as_json=as_json)

@@ -133,18 +133,16 @@ class ResultsFolder:
 
     def progress(self) -> tuple[int, dict[str, int]]:
         """Return how many runs of the design are done, in the folder or its cells, by status."""
-        inner = [ResultsFolder(file.parent) for file in self.path.glob("cells/*/manifest.json")]
-        if inner:
-            counts: Counter[str] = Counter()
-            for cell in inner:
-                counts.update(cell.progress()[1])
-        else:
-            runs = self.done()
-            if runs is None:
-                return 0, {}
+        design = self.read_json("manifest.json")["design"]
+        counts: Counter[str] = Counter()
+        for cell in design.get("cells", ()):
+            inner = ResultsFolder(self.path / "cells" / cell)
+            if (inner.path / "manifest.json").exists():
+                counts.update(inner.progress()[1])
+        runs = self.done()
+        if runs is not None:
             # A folder may hold runs of an earlier, larger design.
-            n = int(self.read_json("manifest.json")["design"]["n"])
-            counts = Counter(runs["status"][runs["run"] < n].tolist())
+            counts.update(runs["status"][runs["run"] < int(design["n"])].tolist())
         return counts.total(), dict(counts.most_common())
 
     def runs(self) -> pd.DataFrame:

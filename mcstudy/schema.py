@@ -31,10 +31,10 @@ class StudyTable(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
-def _check_folder_name(name: str) -> None:
+def _check_folder_name(name: str, place: str = "") -> None:
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,79}", name) or ".." in name:
         raise ValueError(
-            f"name {name!r} must be letters, digits, '_', '-' or '.', as it names a folder"
+            f"{place}name {name!r} must be letters, digits, '_', '-' or '.', as it names a folder"
         )
 
 
@@ -253,7 +253,7 @@ class Front(StudyTable):
 class Scenario(StudyTable):
     """``[scenarios.<name>]``: what is changed against the study as it stands."""
 
-    title: str
+    title: Annotated[str, Field(min_length=1)]
     inputs: dict[str, Distribution] = {}
     fixed: dict[str, Value] = {}
 
@@ -261,7 +261,7 @@ class Scenario(StudyTable):
 class ObservedInjury(StudyTable):
     """``[[observed]]``: an injury of the real case."""
 
-    label: str
+    label: Annotated[str, Field(min_length=1)]
     mechanism: str
     level: Annotated[int, Field(ge=1, le=6)]
 
@@ -274,8 +274,10 @@ class Limit(StudyTable):
     level: Annotated[int, Field(ge=1, le=6)] = 3
 
 
-REFERENCE = "reference"
-"""The scenario of an injury study that changes nothing."""
+REFERENCE, AS_IT_STANDS = "reference", "as it stands"
+"""Name and title of the scenario of an injury study that changes nothing."""
+HEAD = "head"
+"""All mechanisms of injury together."""
 
 
 class InjuryStudy(CommonStudy):
@@ -296,11 +298,27 @@ class InjuryStudy(CommonStudy):
 
     @model_validator(mode="after")
     def _consistent(self) -> "InjuryStudy":
-        for name in [*self.fronts, *self.scenarios]:
-            _check_folder_name(name)
+        for table, names in (("fronts", [*self.fronts]), ("scenarios", [*self.scenarios])):
+            for name in names:
+                _check_folder_name(name, f"{table}: ")
+        if HEAD in self.mechanisms:
+            raise ValueError(f"mechanisms.{HEAD}: this name is that of all mechanisms together")
+        titles = [AS_IT_STANDS, *(s.title for s in self.scenarios.values())]
+        for title in titles:
+            if titles.count(title) > 1:
+                raise ValueError(f"scenarios: two have the title {title!r}")
         if REFERENCE in self.scenarios:
             raise ValueError(f"scenarios.{REFERENCE}: this name is the study's as it stands")
         for name, scenario in self.scenarios.items():
+            for key in scenario.fixed:
+                if key in scenario.inputs:
+                    raise ValueError(f"scenarios.{name}: {key} is both sampled and fixed")
+                children = [k for k, entry in self.inputs.items() if key in entry.parents]
+                if children:
+                    raise ValueError(
+                        f"scenarios.{name}.fixed.{key}: {children[0]} depends on it; give it a "
+                        f"narrow distribution in scenarios.{name}.inputs.{key} instead"
+                    )
             for key in scenario.inputs:
                 if key not in self.inputs:
                     raise ValueError(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mcstudy import config, designs
 from mcstudy.config import InjuryStudy, load_study
 from mcstudy.errors import UserError
+from mcstudy.failures import locate_failures
 from mcstudy.figures import style
 from mcstudy.injury.functions import RiskFunction, risk_function
 from mcstudy.progress import say
@@ -63,7 +64,11 @@ def run_injury(
         "study": study.name,
         "kind": study.kind,
         "seed": study.seed,
-        "design": {"method": study.design.method, "n": n * len(prepared), "cells": len(prepared)},
+        "design": {
+            "method": study.design.method,
+            "n": n * len(prepared),
+            "cells": [f"{cell.scenario}/{cell.front}" for cell, _, _ in prepared],
+        },
         "finished": False,
     }
     with folder.open_for_writing():
@@ -81,7 +86,7 @@ def run_injury(
                             "replicate_size": study.design.size},
                     replicate=np.arange(n) // study.design.size, workers=workers, quiet=quiet,
                 )  # fmt: skip
-            digests[f"{cell.scenario}.{cell.front}"] = digest(runs)
+            digests[f"{cell.scenario}/{cell.front}"] = digest(runs)
             counts = counts.add(runs["status"].value_counts(), fill_value=0)
         manifest |= {
             "counts": {str(k): int(v) for k, v in counts.items()},
@@ -105,30 +110,56 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
     study = load_study(folder.path / "study.toml")
     if not isinstance(study, InjuryStudy):
         raise UserError(f"{folder.path}: is not the folder of an injury study")
-    functions = check_functions(study, load_study_model(study))
+    model = load_study_model(study)
+    functions = check_functions(study, model)
     frames = []
     for cell in cells_of(study):
-        model = load_study_model(cell.study)
         runs = cell.folder(folder).runs()
         runs = runs[runs["run"] < study.design.n]
-        counts = {str(k): int(v) for k, v in runs["status"].value_counts().items()}
-        check_failures(counts, set(counts) - complete_status(model), study.max_failure_rate)
-        complete = runs[runs["status"].isin(complete_status(model))]
-        frames.append(complete.assign(scenario=cell.scenario, front=cell.front))
-    cases = outcomes_of(study, pd.concat(frames, ignore_index=True), functions)
+        if len(runs) < study.design.n:
+            raise UserError(
+                f"{cell.folder(folder).path}: {len(runs)} of {study.design.n} runs are done; run "
+                "the study again to go on"
+            )
+        frames.append(runs.assign(scenario=cell.scenario, front=cell.front))
+    runs = pd.concat(frames, ignore_index=True)
+    ended, complete = judge_injury_runs(study, model, runs)
+    cases = outcomes_of(study, runs[complete], functions)
     folder.write_frame(CASES, cases)
-    folder.write_json("analysis.json", analyse(study, load_study_model(study), cases, functions))
+    folder.write_json("analysis.json", ended | analyse(study, model, cases, functions))
     analysis = folder.read_json("analysis.json")
     figures = draw(study, cases, analysis, functions)
     style.save(figures, folder.path / "figures")
     sections = sections_of(study, analysis, figures, functions)
     subtitle = (
-        f"Injury study of {len(cases):,} runs of the {study.model.name} model, "
+        f"Injury study of {len(runs):,} runs of the {study.model.name} model, "
         f"{len(analysis['scenarios'])} scenario(s), {len(analysis['fronts'])} car front(s), "
         f"seed {study.seed}"
     )
     folder.write_text("report.html", render(study.title, subtitle, sections))
     return analysis
+
+
+def judge_injury_runs(
+    study: InjuryStudy, model: Model, runs: pd.DataFrame
+) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+    """Return how the runs ended, and (n,) which are complete.
+
+    Raises
+    ------
+    StudyError
+        If more runs failed than the study allows.
+    """
+    complete: NDArray[np.bool_] = runs["status"].isin(complete_status(model)).to_numpy(dtype=bool)
+    counts = {str(k): int(v) for k, v in runs["status"].value_counts().items()}
+    check_failures(counts, set(counts) - complete_status(model), study.max_failure_rate)
+    ended = {
+        "kind": study.kind,
+        "runs": len(runs),
+        "status": counts,
+        "failures": locate_failures(runs[list(study.inputs)], ~complete),
+    }
+    return ended, complete
 
 
 def check_functions(study: InjuryStudy, model: Model) -> dict[str, RiskFunction]:
@@ -155,8 +186,11 @@ def check_functions(study: InjuryStudy, model: Model) -> dict[str, RiskFunction]
                 )
             found[name] = function
     config.check_outputs([study.limit.output], model, "limit.output")
-    if study.age is None and "age" not in {item.name for item in model.inputs}:
+    has_age = "age" in {item.name for item in model.inputs}
+    if study.age is None and not has_age:
         raise UserError(f"age: model {model.name!r} has no input 'age'; give it in years")
+    if study.age is not None and has_age:
+        raise UserError(f"age: model {model.name!r} has an input 'age'; sample or fix that")
     return found
 
 

@@ -13,7 +13,7 @@ from mcstudy.injury.ais import LEVELS, Mechanism, combine, distribution, draw_ai
 from mcstudy.injury.association import fit_proportional_odds, rank_correlations
 from mcstudy.injury.classifier import judge_limit, receiver_operating_characteristic
 from mcstudy.injury.functions import RiskFunction
-from mcstudy.schema import REFERENCE
+from mcstudy.schema import AS_IT_STANDS, HEAD, REFERENCE
 from mcstudy.statistics import Estimate, between_replicates
 from models.protocol import Model
 from studies.injury_cells import fronts_of
@@ -25,8 +25,6 @@ BATCHES = 20
 """Parts of an independent sample between which intervals are taken (assumed)."""
 PREDICTORS = ("hic15", "impact_speed", "throw_distance", "wad")
 """What the AIS is set against, where a model has it."""
-HEAD = "head"
-"""All mechanisms together."""
 
 
 def risk_column(mechanism: str, level: int) -> str:
@@ -73,17 +71,14 @@ def analyse(
     ----------
     study, model, functions : of the cases. cases : of ``outcomes_of``.
     """
-    titles = {REFERENCE: "as it stands"} | {k: s.title for k, s in study.scenarios.items()}
+    titles = {REFERENCE: AS_IT_STANDS} | {k: s.title for k, s in study.scenarios.items()}
     shares = {name: front.share for name, front in fronts_of(study).items()}
     total = sum(shares.values())
     shares = {name: share / total for name, share in shares.items()}
     parts = {name: cases[cases["scenario"] == name] for name in titles}
     analysis: dict[str, Any] = {
-        "kind": study.kind,
-        "runs": len(cases),
-        "status": {str(k): int(v) for k, v in cases["status"].value_counts().items()},
         "fronts": shares,
-        "limit": study.limit.model_dump(),
+        "limit": study.limit.model_dump() | {"unit": _unit_of(model, study.limit.output)},
         "scenarios": {},
     }
     reference = parts[REFERENCE]
@@ -91,15 +86,20 @@ def analyse(
         entry = {"title": titles[name], "runs": len(part)} | _outcome(study, part, shares)
         if name != REFERENCE:
             entry["difference"] = _differences(study, reference, part, shares)
-        entry["association"] = _associations(study, model, part)
+        entry["association"] = _associations(study, model, proportional(part, shares))
         entry["limit"] = {
-            mechanism: _limit(study, part, mechanism) for mechanism in _judged_by(study, functions)
+            mechanism: _limit(study, part, mechanism, shares)
+            for mechanism in _judged_by(study, functions)
         }
         analysis["scenarios"][name] = entry
     analysis["functions"] = _by_function(study, reference, functions, shares)
     analysis["observed"] = _observed(study, reference, functions, shares)
     analysis["speed"] = describe_speed(study, cases, shares)
     return analysis
+
+
+def _unit_of(model: Model, output: str) -> str:
+    return next(item.unit for item in model.outputs if item.name == output)
 
 
 def population(
@@ -119,6 +119,23 @@ def _within_bounds(estimate: Estimate) -> Estimate:
     """Return the estimate of a probability with its interval cut to 0 and 1."""
     low, high = (float(np.clip(side, 0.0, 1.0)) for side in (estimate.low, estimate.high))
     return Estimate(estimate.value, low, high)
+
+
+def weights_of(part: pd.DataFrame, shares: Mapping[str, float]) -> Array:
+    """Return by how much each run counts: the share of its front over the front's runs."""
+    counts = part["front"].value_counts()
+    each = {name: share / counts[name] for name, share in shares.items() if name in counts}
+    return np.asarray(part["front"].map(each), dtype=float)
+
+
+def proportional(part: pd.DataFrame, shares: Mapping[str, float]) -> pd.DataFrame:
+    """Return runs of every front in proportion to its share, the first of each."""
+    largest = max(shares.values())
+    kept = [
+        held.iloc[: round(len(held) * shares[str(name)] / largest)]
+        for name, held in part.groupby("front", sort=False)
+    ]
+    return pd.concat(kept)
 
 
 def _mean(part: pd.DataFrame, values: Array, shares: Mapping[str, float]) -> float:
@@ -178,7 +195,9 @@ def _differences(
         centre = [_mean(p, _head(p, level), shares) for p in (part, reference)]
         apart = np.asarray((batches[0] - batches[1]).dropna(), dtype=float)
         change = between_replicates(apart, centre[0] - centre[1])
-        found[str(level)] = change.as_dict() | {"relative": centre[0] / centre[1] - 1.0}
+        found[str(level)] = change.as_dict() | {
+            "relative": centre[0] / centre[1] - 1.0 if centre[1] else np.nan
+        }
     return found
 
 
@@ -217,21 +236,25 @@ def _judged_by(study: InjuryStudy, functions: Mapping[str, RiskFunction]) -> lis
     return [HEAD, *own] if len(study.mechanisms) > 1 else [HEAD]
 
 
-def _limit(study: InjuryStudy, part: pd.DataFrame, mechanism: str) -> dict[str, Any]:
+def _limit(
+    study: InjuryStudy, part: pd.DataFrame, mechanism: str, shares: Mapping[str, float]
+) -> dict[str, Any]:
     """Return the limit as a classifier, with intervals between the parts of the design."""
     limit = study.limit
     stimulus = part[limit.output].to_numpy(dtype=float)
     risk = part[risk_column(mechanism, limit.level)].to_numpy(dtype=float)
     if not 0.0 < risk.mean() < 1.0:
         return {}
-    judged = judge_limit(stimulus, risk, limit.value)
-    roc = receiver_operating_characteristic(stimulus, risk)
+    weight = weights_of(part, shares)
+    judged = judge_limit(stimulus, risk, limit.value, weight)
+    roc = receiver_operating_characteristic(stimulus, risk, weight)
     size = study.design.size if study.design.size > 1 else max(1, study.design.n // BATCHES)
     batch = part["run"].to_numpy() // size
     rows = []
     for b in np.unique(batch):
-        mine = judge_limit(stimulus[batch == b], risk[batch == b], limit.value)
-        area = receiver_operating_characteristic(stimulus[batch == b], risk[batch == b]).area
+        own = stimulus[batch == b], risk[batch == b]
+        mine = judge_limit(*own, limit.value, weight[batch == b])
+        area = receiver_operating_characteristic(*own, weight[batch == b]).area
         rows.append((mine.sensitivity, mine.specificity, mine.positive, mine.negative, area))
     centre = (judged.sensitivity, judged.specificity, judged.positive, judged.negative, roc.area)
     names = ("sensitivity", "specificity", "positive", "negative", "area")
@@ -288,7 +311,9 @@ def _observed(
                 stimulus = reference[functions[name].stimulus].to_numpy(dtype=float)
                 own = exceedance(functions[name], stimulus, age)[:, item.level - 1]
                 by_function[name] = _mean(reference, own, shares)
-        low, high = np.quantile(risk, [0.05, 0.95])
+        low, high = np.quantile(
+            risk, [0.05, 0.95], weights=weights_of(reference, shares), method="inverted_cdf"
+        )
         entries.append(
             {
                 "label": item.label,

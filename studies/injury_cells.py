@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from mcstudy.config import InjuryStudy, MonteCarloStudy
 from mcstudy.results import ResultsFolder
-from mcstudy.schema import REFERENCE, Front, Report, Scenario
+from mcstudy.schema import AS_IT_STANDS, REFERENCE, Front, Report, Scenario
 
 
 @dataclass(frozen=True)
@@ -19,12 +19,12 @@ class Cell:
 
     def folder(self, study_folder: ResultsFolder) -> ResultsFolder:
         """Return the cell's own folder."""
-        return ResultsFolder(study_folder.path / "cells" / f"{self.scenario}.{self.front}")
+        return ResultsFolder(study_folder.path / "cells" / self.scenario / self.front)
 
 
 def cells_of(study: InjuryStudy) -> Iterator[Cell]:
     """Yield the cells of a study, the reference scenario first."""
-    scenarios = {REFERENCE: Scenario(title="as it stands")} | study.scenarios
+    scenarios = {REFERENCE: Scenario(title=AS_IT_STANDS)} | study.scenarios
     for scenario, changes in scenarios.items():
         for front, entry in fronts_of(study).items():
             model = study.model.model_copy(update={"options": study.model.options | entry.options})

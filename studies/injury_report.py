@@ -12,7 +12,8 @@ from mcstudy.injury.functions import RiskFunction, speed_curves
 from mcstudy.report import Section, Table
 from mcstudy.schema import REFERENCE
 from mcstudy.text import interval, number, percent
-from studies.injury_analysis import ages_of
+from studies.failure_report import failure_map, failures_said, status_table
+from studies.injury_analysis import ages_of, proportional
 
 FEW = 1000.0
 """Impacts that counts of injured are given for."""
@@ -33,7 +34,7 @@ def draw(
         for words, shares in scenarios[REFERENCE]["mechanisms"].items()
         if len(study.mechanisms) > 1
     }
-    figures: dict[str, Any] = {"ais": risk.draw_ais(bars)}
+    figures: dict[str, Any] = failure_map(analysis) | {"ais": risk.draw_ais(bars)}
     age = np.array([float(np.median(ages_of(study, reference)))])
     for stimulus in dict.fromkeys(function.stimulus for function in functions.values()):
         held = reference[stimulus].dropna().to_numpy(dtype=float)
@@ -51,10 +52,12 @@ def draw(
         )
     figures["exceedance"] = risk.draw_exceedance(
         {
-            entry["title"]: cases.loc[cases["scenario"] == name, study.limit.output].to_numpy(float)
+            entry["title"]: proportional(cases[cases["scenario"] == name], analysis["fronts"])[
+                study.limit.output
+            ].to_numpy(float)
             for name, entry in scenarios.items()
         },
-        style.words(study.limit.output),
+        style.label(study.limit.output, analysis["limit"]["unit"]),
         study.limit.value,
     )
     rocs = _judged(analysis)
@@ -121,7 +124,7 @@ def sections_of(
             _limit_said(analysis),
             [_limit_table(analysis)],
             one("exceedance", "Share of the runs above each value, with a 95 % band for the whole "
-                "curve.")
+                "curve (as if the runs were independent).")
             | one("roc", "Sensitivity over false alarms for all limits."),
         ),
         Section("What goes with the AIS", (
@@ -132,7 +135,12 @@ def sections_of(
         Section("Risk against impact speed", _speed_said(analysis), (), one(
             "speed", "Means over bins of the speed, made to rise, with 95 % bands. Grey: published "
             "curves, for adults and other injuries, to compare the shape.")),
-        Section("How the numbers came about", _honesty(study, functions)),
+        Section(
+            "How the numbers came about",
+            [*_honesty(study, functions), *failures_said(analysis)],
+            [status_table(analysis)],
+            one("failures", "Share of failed runs in each tenth of each input."),
+        ),
     ]  # fmt: skip
 
 
@@ -145,24 +153,30 @@ def summarise(analysis: Mapping[str, Any]) -> list[str]:
     for name, entry in scenarios.items():
         if name == REFERENCE:
             continue
-        change = entry["difference"][level]
-        verb = "fewer" if change["value"] < 0.0 else "more"
-        size = {
-            "value": abs(change["value"]),
-            "low": min(abs(change["low"]), abs(change["high"])),
-            "high": max(abs(change["low"]), abs(change["high"])),
-        }
-        clear = change["low"] > 0.0 or change["high"] < 0.0
-        title = entry["title"][0].upper() + entry["title"][1:]
         lines.append(
-            f"{title}: {_count(entry['at_least'][level])}, "
-            + (
-                f"{_count(size)} {verb} ({100.0 * change['relative']:+.0f} %)."
-                if clear
-                else "no difference that can be told from none."
-            )
+            f"{_capital(entry['title'])}: {_count(entry['at_least'][level])}, "
+            f"{_changed(entry['difference'][level])}."
         )
     return lines
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _changed(change: Mapping[str, float | None]) -> str:
+    """Say how many fewer or more."""
+    value, low, high, relative = (change[k] for k in ("value", "low", "high", "relative"))
+    assert value is not None
+    verb = "fewer" if value < 0.0 else "more"
+    percentage = "" if relative is None else f" ({100.0 * relative:+.0f} %)"
+    if low is None or high is None:
+        return f"{_count({'value': abs(value), 'low': None, 'high': None})} {verb}{percentage}"
+    if low <= 0.0 <= high:
+        return "no difference that can be told from none"
+    ends = sorted((abs(low), abs(high)))
+    size = {"value": abs(value), "low": ends[0], "high": ends[1]}
+    return f"{_count(size)} {verb}{percentage}"
 
 
 def _count(estimate: Mapping[str, float | None]) -> str:
@@ -173,13 +187,20 @@ def _count(estimate: Mapping[str, float | None]) -> str:
         count = float("nan") if side is None else FEW * side
         shown.append(f"{count:,.0f}" if abs(count) >= 10.0 else f"{count:.1f}")
     value, low, high = (text.replace("-0.0", "0.0").replace("nan", "–") for text in shown)
-    return f"{value} ({low} to {high})"
+    return value if "–" in (low, high) else f"{value} ({low} to {high})"
 
 
-def _spread(estimate: Mapping[str, float]) -> str:
+def _spread(estimate: Mapping[str, float | None]) -> str:
     """Return a probability with half its interval."""
-    half = 50.0 * (estimate["high"] - estimate["low"])
-    return f"{100.0 * estimate['value']:.1f} ± {half:.1f} %"
+    value, low, high = (estimate[key] for key in ("value", "low", "high"))
+    if value is None:
+        return "–"
+    if low is None or high is None:
+        return f"{100.0 * value:.1f} %"
+    if low <= 0.0 or high >= 1.0:
+        # An interval that ends at a border is no half on either side.
+        return f"{100.0 * value:.1f} ({100.0 * low:.1f} to {100.0 * high:.1f}) %"
+    return f"{100.0 * value:.1f} ± {50.0 * (high - low):.1f} %"
 
 
 def _by_level(caption: str, columns: Mapping[str, Mapping[str, Any]]) -> Table:
@@ -227,11 +248,12 @@ def _observed_said(analysis: Mapping[str, Any]) -> list[str]:
             f"{100.0 * value:.0f} % by {analysis['functions'][name]['title']}"
             for name, value in entry["by_function"].items()
         )
-        label = entry["label"][0].upper() + entry["label"][1:]
+        label = _capital(entry["label"])
         lines.append(
             f"{label} (AIS {entry['level']}): its probability was "
             f"{percent(entry['probability'])}; over nine runs in ten it lies between "
-            f"{100.0 * low:.0f} and {100.0 * high:.0f} %. By risk function: {by}."
+            f"{100.0 * low:.0f} and {100.0 * high:.0f} %."
+            + (f" By risk function: {by}." if by else "")
         )
     if "all" in observed:
         both = observed["all"]
@@ -283,7 +305,7 @@ def _limit_said(analysis: Mapping[str, Any]) -> list[str]:
     limit = analysis["limit"]
     lines = []
     for entry in analysis["scenarios"].values():
-        said = f"{entry['title'][0].upper() + entry['title'][1:]}: " + (
+        said = f"{_capital(entry['title'])}: " + (
             f"{percent(entry['above_limit'])} of the runs exceed {limit['value']:g}"
         )
         judged = next(iter(entry["limit"].values()))
@@ -304,8 +326,8 @@ def _limit_table(analysis: Mapping[str, Any]) -> Table:
          interval(judged["area"], 2), number(judged["best"])]
         for words, judged in _judged(analysis).items()
     ]  # fmt: skip
-    head = ["test of", "sensitivity", "specificity", "risk above", "uninjured below", "ROC area",
-            "best limit"]  # fmt: skip
+    head = ["test of", "sensitivity", "specificity", "PPV (risk above)",
+            "NPV (uninjured below)", "ROC area", "best limit"]  # fmt: skip
     return Table("The limit as a classifier (95 % intervals); outcomes count by their "
                  "probability.", head, rows)  # fmt: skip
 

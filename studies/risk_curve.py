@@ -14,8 +14,11 @@ from mcstudy.injury.cases import observations_of, read_table
 from mcstudy.injury.risk_curve import INFLUENTIAL, describe_risk
 from mcstudy.report import Section, Table, render
 from mcstudy.results import ResultsFolder
+from mcstudy.schema import REFERENCE
 from mcstudy.text import interval, number, unit
 from studies.execution import load_study_model
+from studies.injury_analysis import proportional
+from studies.injury_cells import fronts_of
 
 CASES = "cases.parquet"
 """What an injury study leaves for this in its folder."""
@@ -37,7 +40,7 @@ def fit_risk_curves(
     stimulus : column.
     folder : where the report goes.
     level : AIS from which a case counts as injured, where the table has a column ``ais``.
-    scenario : of an injury study; by default all.
+    scenario : of an injury study; by default the study as it stands.
 
     Returns
     -------
@@ -49,17 +52,16 @@ def fit_risk_curves(
     UserError
         If the table is wrong or allows no curve.
     """
-    table, named = _read(source, stimulus)
-    if scenario is not None:
-        if "scenario" not in table.columns or scenario not in set(table["scenario"]):
-            raise UserError(f"{source}: has no scenario {scenario!r}")
-        table = table[table["scenario"] == scenario]
+    if source.is_dir() and folder.path.resolve() == source.resolve():
+        raise UserError(f"{folder.path}: holds the study itself; choose another --out")
+    table, named = _read(source, stimulus, scenario)
     observations = observations_of(table.reset_index(drop=True), stimulus, level, str(source))
     try:
         found = describe_risk(observations)
     except ValueError as error:
         raise UserError(f"{source}: {error}") from None
-    injury = f"AIS{level}+" if "injured" not in table.columns else "injury"
+    plain = "injured" in table.columns or f"{stimulus}_low" in table.columns
+    injury = "injury" if plain else f"AIS{level}+"
     with folder.open_for_writing():
         folder.write_json(
             "analysis.json",
@@ -81,19 +83,33 @@ def fit_risk_curves(
     return analysis
 
 
-def _read(source: Path, stimulus: str) -> tuple[pd.DataFrame, str | None]:
-    """Return the table of cases, and the unit of the stimulus where a study tells it."""
+def _read(source: Path, stimulus: str, scenario: str | None) -> tuple[pd.DataFrame, str | None]:
+    """Return the table of cases, and the unit of the stimulus where a study tells it.
+
+    Of a study's cases one scenario is taken, its car fronts in proportion to their shares: others
+    are the same people once more.
+    """
     if not source.is_dir():
+        if scenario is not None:
+            raise UserError(f"{source}: is no injury study, it has no scenario {scenario!r}")
         return read_table(source), None
     study = load_study(source / "study.toml")
+    if not isinstance(study, InjuryStudy):
+        raise UserError(f"{source}: is not the folder of an injury study")
     table = read_table(source / CASES)
+    wanted = scenario or REFERENCE
+    if wanted not in set(table["scenario"]):
+        names = ", ".join(map(str, table["scenario"].unique()))
+        raise UserError(f"{source}: has no scenario {wanted!r}, only {names}")
+    shares = {name: front.share for name, front in fronts_of(study).items()}
+    table = proportional(table[table["scenario"] == wanted], shares)
     model = load_study_model(study)
     known = {item.name: item.unit for item in model.inputs}
     known |= {item.name: item.unit for item in model.outputs}
     if stimulus not in known:
         return table, None
     named = known[stimulus]
-    if isinstance(study, InjuryStudy) and stimulus in study.inputs:
+    if stimulus in study.inputs:
         # People read an input in the unit that the study file gives it in.
         shown = study.inputs[stimulus].unit
         table[stimulus] /= units.factor(shown, named)
@@ -109,7 +125,7 @@ def summarise(analysis: Mapping[str, Any]) -> list[str]:
         f"{interval(analysis['at'][p])}{unit_text}" for p in ("0.5", "0.25", "0.05")
     )
     lines = [
-        f"Half of the people are injured ({analysis['injury']}) at "
+        f"Half are injured ({analysis['injury']}) at "
         f"{style.words(analysis['stimulus'])} {half}, one in four at {quarter}, one in twenty at "
         f"{few} ({analysis['family']} curve, {analysis['cases']:,} cases, "
         f"{analysis['injured']:,} injured)."

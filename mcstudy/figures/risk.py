@@ -185,12 +185,12 @@ def draw_roc(
         return figure
 
 
-def draw_exceedance(samples: Mapping[str, Array], words: str, limit: float) -> Figure:
+def draw_exceedance(samples: Mapping[str, Array], xlabel: str, limit: float) -> Figure:
     """Return the share of runs above each value, with a 95 % band for the whole curve.
 
     Parameters
     ----------
-    samples : (n,) by label; NaN counts as never above. words : output, without a unit.
+    samples : (n,) by label; NaN counts as never above. xlabel : output and unit.
     limit : drawn as a line.
     """
     with style.styled():
@@ -210,7 +210,7 @@ def draw_exceedance(samples: Mapping[str, Array], words: str, limit: float) -> F
             largest = max(largest, float(np.quantile(held, 0.995)))
         axes.axvline(limit, color="black", linewidth=1.0, linestyle="--", label=f"limit {limit:g}")
         axes.set(xlim=(0.0, 1.05 * max(largest, limit)), ylim=(0.0, 1.0))
-        axes.set_xlabel(f"{words} [–]")
+        axes.set_xlabel(xlabel)
         axes.set_ylabel("share of the runs above [–]")
         axes.legend(fontsize=8)
         return figure

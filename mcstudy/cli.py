@@ -102,7 +102,8 @@ def sensitivity(
 ) -> None:
     """Measure what drives the outputs of any results folder, whatever its design was."""
     from mcstudy.results import ResultsFolder
-    from studies import sensitivity, sensitivity_report
+    from studies.sensitivity import measure as sensitivity
+    from studies.sensitivity import report as sensitivity_report
 
     target = ResultsFolder(out or folder / "sensitivity")
     analysis = sensitivity.measure_sensitivity(

@@ -17,8 +17,8 @@ from mcstudy.results import ResultsFolder
 from mcstudy.schema import REFERENCE
 from mcstudy.text import interval, number, unit
 from studies.execution import load_study_model
-from studies.injury_analysis import proportional
-from studies.injury_cells import fronts_of
+from studies.injury.analysis import proportional
+from studies.injury.cells import fronts_of
 
 CASES = "cases.parquet"
 """What an injury study leaves for this in its folder."""

@@ -26,10 +26,14 @@ from mcstudy.injury import association
 from mcstudy.injury.functions import RiskFunction
 from mcstudy.results import ResultsFolder
 from models.registry import load_model
-from studies import api, evaluation, injury, injury_analysis, injury_report, injury_speed
+from studies import api, evaluation
 from studies.execution import load_study_model
-from studies.injury_analysis import analyse, outcomes_of
-from studies.injury_cells import cells_of
+from studies.injury import analysis as injury_analysis
+from studies.injury import report as injury_report
+from studies.injury import speed as injury_speed
+from studies.injury import study as injury
+from studies.injury.analysis import analyse, outcomes_of
+from studies.injury.cells import cells_of
 
 Array = NDArray[np.float64]
 

@@ -22,8 +22,8 @@ from mcstudy.injury.observations import Observations, observe
 from mcstudy.injury.survival import FAMILIES, RiskFit, fit_risk_curve, quality_class
 from mcstudy.report import document
 from mcstudy.results import ResultsFolder
-from studies import injury
 from studies.api import run_study
+from studies.injury import study as injury
 
 Array = NDArray[np.float64]
 

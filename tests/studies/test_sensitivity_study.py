@@ -29,8 +29,8 @@ from headform_studies import (
 from mcstudy.errors import UserError
 from mcstudy.results import ResultsFolder
 from mcstudy.sensitivity import delta, given_data
-from studies import sensitivity_report
-from studies.sensitivity import measure_sensitivity
+from studies.sensitivity import report as sensitivity_report
+from studies.sensitivity.measure import measure_sensitivity
 
 DESIGNS = {
     "monte-carlo": 'method = "monte-carlo"\nn = 512',

@@ -13,7 +13,7 @@ from mcstudy.report import Section, Table
 from mcstudy.schema import REFERENCE
 from mcstudy.text import interval, number, percent
 from studies.failure_report import failure_map, failures_said, status_table
-from studies.injury_analysis import ages_of, proportional
+from studies.injury.analysis import ages_of, proportional
 
 FEW = 1000.0
 """Impacts that counts of injured are given for."""

@@ -21,9 +21,9 @@ from mcstudy.report import render
 from mcstudy.results import ResultsFolder, check_failures, digest
 from models.protocol import Model, complete_status
 from studies.execution import load_study_model, run_rows
-from studies.injury_analysis import analyse, outcomes_of
-from studies.injury_cells import Cell, cells_of
-from studies.injury_report import draw, sections_of
+from studies.injury.analysis import analyse, outcomes_of
+from studies.injury.cells import Cell, cells_of
+from studies.injury.report import draw, sections_of
 from studies.risk_curve import CASES
 
 Array = NDArray[np.float64]

@@ -17,7 +17,7 @@ from mcstudy.sensitivity.given_data import measure_given_data
 from models.protocol import complete_status
 from studies.execution import load_study_model
 from studies.main_effects import main_effects_of
-from studies.sensitivity_report import draw, sections_of
+from studies.sensitivity.report import draw, sections_of
 
 
 def measure_sensitivity(

@@ -16,8 +16,8 @@ from mcstudy.injury.functions import RiskFunction
 from mcstudy.schema import AS_IT_STANDS, HEAD, REFERENCE
 from mcstudy.statistics import Estimate, between_replicates
 from models.protocol import Model
-from studies.injury_cells import fronts_of
-from studies.injury_speed import describe_speed
+from studies.injury.cells import fronts_of
+from studies.injury.speed import describe_speed
 
 Array = NDArray[np.float64]
 

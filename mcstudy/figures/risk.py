@@ -12,6 +12,8 @@ from mcstudy.figures import style
 
 Array = NDArray[np.float64]
 
+DASHES = ("--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)), (0, (1, 4)))
+"""Of published curves, all grey."""
 LEVEL_COLOURS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7", "#000000")
 """Of AIS1 to AIS6, of Okabe and Ito's palette."""
 
@@ -121,7 +123,7 @@ def draw_speed_risk(
                               linewidth=0)  # fmt: skip
             axes.plot(entry["speed"], entry["risk"], color=colour, linewidth=1.8, label=label)
         for k, (label, (speed, risk)) in enumerate(published.items()):
-            axes.plot(speed, risk, color=style.GREY, linestyle=("--", ":", "-.")[k % 3],
+            axes.plot(speed, risk, color=style.GREY, linestyle=DASHES[k % len(DASHES)],
                       linewidth=1.2, label=label)  # fmt: skip
         axes.set(ylim=(0.0, 1.0), title=title)
         axes.set_xlabel("impact speed [km/h]")

@@ -323,7 +323,7 @@ def test_roc_curves_are_drawn_with_their_mark() -> None:
 
 def test_exceedance_has_a_band_and_the_limit() -> None:
     sample = np.array([1.0, 2.0, 3.0, 4.0])
-    figure = risk.draw_exceedance({"reference": sample}, "HIC15", 2.5)
+    figure = risk.draw_exceedance({"reference": sample}, "HIC15 [–]", 2.5)
     (axes,) = figure.axes
     assert_units(axes)
     assert axes.get_xlabel() == "HIC15 [–]"

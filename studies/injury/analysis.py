@@ -16,13 +16,11 @@ from mcstudy.injury.functions import RiskFunction
 from mcstudy.schema import AS_IT_STANDS, HEAD, REFERENCE
 from mcstudy.statistics import Estimate, between_replicates
 from models.protocol import Model
-from studies.injury.cells import fronts_of
+from studies.injury.cells import BATCHES, batch_of, fronts_of
 from studies.injury.speed import describe_speed
 
 Array = NDArray[np.float64]
 
-BATCHES = 20
-"""Parts of an independent sample between which intervals are taken (assumed)."""
 PREDICTORS = ("hic15", "impact_speed", "throw_distance", "wad")
 """What the AIS is set against, where a model has it."""
 
@@ -147,9 +145,9 @@ def _by_batch(
     study: InjuryStudy, part: pd.DataFrame, values: Array, shares: Mapping[str, float]
 ) -> "pd.Series[float]":
     """Return the estimate of each independent part of the design that has runs of every front."""
-    run = part["run"].to_numpy()
-    size = study.design.size if study.design.size > 1 else max(1, study.design.n // BATCHES)
-    table = pd.DataFrame({"batch": run // size, "front": part["front"].to_numpy(), "value": values})
+    table = pd.DataFrame(
+        {"batch": batch_of(study, part), "front": part["front"].to_numpy(), "value": values}
+    )
     means = table.groupby(["batch", "front"])["value"].mean().unstack("front")
     weights = pd.Series(shares)
     return (means[list(weights.index)] * weights).sum(axis=1, skipna=False).dropna()
@@ -248,8 +246,7 @@ def _limit(
     weight = weights_of(part, shares)
     judged = judge_limit(stimulus, risk, limit.value, weight)
     roc = receiver_operating_characteristic(stimulus, risk, weight)
-    size = study.design.size if study.design.size > 1 else max(1, study.design.n // BATCHES)
-    batch = part["run"].to_numpy() // size
+    batch = batch_of(study, part)
     rows = []
     for b in np.unique(batch):
         own = stimulus[batch == b], risk[batch == b]

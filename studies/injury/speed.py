@@ -12,6 +12,7 @@ from mcstudy import seeds
 from mcstudy.config import InjuryStudy
 from mcstudy.figures.style import words
 from mcstudy.schema import REFERENCE
+from studies.injury.cells import batch_of
 
 Array = NDArray[np.float64]
 
@@ -60,8 +61,7 @@ def describe_speed(
     slowest, fastest = (float(v) for v in np.quantile(speed, [0.01, 0.99]))
     edges = np.linspace(slowest, fastest, BINS + 1)
     place = np.clip(np.searchsorted(edges, speed, side="right") - 1, 0, BINS - 1)
-    size = study.design.size if study.design.size > 1 else max(1, study.design.n // 20)
-    batch = held["run"].to_numpy() // size
+    batch = batch_of(study, held)
     weight = held["front"].map(dict(shares)).to_numpy(dtype=float)
     # Sums of weights and of weighted risks by part of the design and bin of the speed.
     cells = (int(batch.max()) + 1, BINS)

@@ -3,6 +3,7 @@
 Exit codes: 0 done, 1 the study failed, 2 the user's input is wrong, 130 interrupted.
 """
 
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -101,7 +102,8 @@ def sensitivity(
 ) -> None:
     """Measure what drives the outputs of any results folder, whatever its design was."""
     from mcstudy.results import ResultsFolder
-    from studies import sensitivity, sensitivity_report
+    from studies.sensitivity import measure as sensitivity
+    from studies.sensitivity import report as sensitivity_report
 
     target = ResultsFolder(out or folder / "sensitivity")
     analysis = sensitivity.measure_sensitivity(
@@ -139,6 +141,34 @@ def fit_stiffness(
         console = Console()
         _print_table(console, stiffness.summary_table(analysis))
         console.print(f"report: {folder.path / 'report.html'}", soft_wrap=True)
+
+
+@app.command("risk-curve")
+def risk_curve(
+    cases: Annotated[
+        Path, typer.Argument(help="Table of cases (CSV, Parquet) or folder of an injury study.")
+    ],
+    stimulus: Annotated[str, typer.Option(help="Column that the risk depends on.")],
+    level: Annotated[
+        int,
+        typer.Option(min=1, max=6, help="AIS that counts as injured, where there is a column ais."),
+    ] = 3,
+    scenario: Annotated[
+        str | None, typer.Option(help="Scenario of an injury study; by default as it stands.")
+    ] = None,
+    out: Out = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Fit injury-risk curves to censored cases, as ISO/TS 18506 does."""
+    from mcstudy.results import ResultsFolder
+    from studies import risk_curve
+
+    name = re.sub(r"[^A-Za-z0-9_-]+", "_", f"risk_{cases.resolve().stem}_{stimulus}")
+    folder = ResultsFolder(out or Path("results") / name)
+    analysis = risk_curve.fit_risk_curves(cases, stimulus, folder, level=level, scenario=scenario)
+    summary = [*risk_curve.summarise(analysis), *risk_curve.tables(analysis)]
+    _print_analysis(analysis, summary, folder.path, quiet=quiet, as_json=as_json)
 
 
 @app.command()
@@ -179,14 +209,7 @@ def status(folder: Folder, as_json: Json = False) -> None:
     results = ResultsFolder(folder)
     manifest = results.read_json("manifest.json")
     total = int(manifest["design"]["n"])
-    runs = results.done()
-    if runs is not None:
-        # A folder may hold runs of an earlier, larger design.
-        runs = runs[runs["run"] < total]
-    done = 0 if runs is None else len(runs)
-    counts = (
-        {} if runs is None else {str(k): int(v) for k, v in runs["status"].value_counts().items()}
-    )
+    done, counts = results.progress()
     if as_json:
         _print_json({"done": done, "total": total, "counts": counts})
         return

@@ -24,6 +24,7 @@ from mcstudy.schema import (
     ComparisonRow,
     ComparisonTable,
     FactorStudy,
+    InjuryStudy,
     MonteCarloStudy,
     MorrisStudy,
     Reconstruction,
@@ -37,6 +38,7 @@ __all__ = [
     "ComparisonRow",
     "ComparisonTable",
     "FactorStudy",
+    "InjuryStudy",
     "MonteCarloStudy",
     "MorrisStudy",
     "Reconstruction",
@@ -86,11 +88,13 @@ def first_problem(error: ValidationError) -> str:
     # Pydantic puts the chosen kind of study and of distribution into the place; the file does not.
     if parts and parts[0] in KINDS:
         parts = parts[1:]
-    if len(parts) > 2 and parts[0] == "inputs" and parts[2] in DISTRIBUTION_NAMES:
-        del parts[2]
-    mixed = len(parts) > 2 and parts[:2] == ["model", "options"]
+    for k in range(len(parts) - 2):
+        if parts[k] == "inputs" and parts[k + 2] in DISTRIBUTION_NAMES:
+            del parts[k + 2]
+            break
+    mixed = "options" in parts[:-1] and parts[0] in ("model", "fronts")
     if mixed:
-        parts = parts[:3]
+        parts = parts[: parts.index("options") + 2]
     place = _one_line(".".join(parts) or "study")
     if mixed:
         return f"{place}: must be a text, a number or a list of pairs of numbers"

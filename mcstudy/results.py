@@ -15,6 +15,7 @@
 import contextlib
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -129,6 +130,20 @@ class ResultsFolder:
         runs = pd.concat(frames, ignore_index=True).drop_duplicates("run")
         ordered: pd.DataFrame = runs.sort_values("run", ignore_index=True)
         return ordered
+
+    def progress(self) -> tuple[int, dict[str, int]]:
+        """Return how many runs of the design are done, in the folder or its cells, by status."""
+        design = self.read_json("manifest.json")["design"]
+        counts: Counter[str] = Counter()
+        for cell in design.get("cells", ()):
+            inner = ResultsFolder(self.path / "cells" / cell)
+            if (inner.path / "manifest.json").exists():
+                counts.update(inner.progress()[1])
+        runs = self.done()
+        if runs is not None:
+            # A folder may hold runs of an earlier, larger design.
+            counts.update(runs["status"][runs["run"] < int(design["n"])].tolist())
+        return counts.total(), dict(counts.most_common())
 
     def runs(self) -> pd.DataFrame:
         """Return the table of runs.

@@ -10,6 +10,7 @@ BOOTSTRAP = 1
 SALTELLI = 2
 GIVEN_DATA = 3
 MORRIS = 4
+OUTCOME = 5
 
 
 def generator(seed: int, stream: int, index: int = 0) -> np.random.Generator:

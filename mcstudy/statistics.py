@@ -119,6 +119,16 @@ def convergence(values: Array, estimator: Callable[[Array], float]) -> list[dict
     return [{"n": size, "value": estimator(finite[:size])} for size in sizes if size >= 8]
 
 
+def between_replicates(estimates: Array, pooled: float) -> Estimate:
+    """Return a pooled estimate with the t interval of the estimates of independent replicates.
+
+    Parameters
+    ----------
+    estimates : (r,) one a replicate. pooled : the estimate from all of them.
+    """
+    return _t_interval(estimates, pooled)
+
+
 def _between(
     values: Array,
     replicate: NDArray[np.int64],

@@ -18,9 +18,16 @@ from mcstudy.errors import UserError
 from mcstudy.report import Table
 from mcstudy.results import ResultsFolder
 from models.protocol import Run
-from studies import monte_carlo, monte_carlo_report, morris, morris_report, sobol, sobol_report
 from studies.execution import load_study_model
+from studies.injury import report as injury_report
+from studies.injury import study as injury
+from studies.monte_carlo import report as monte_carlo_report
+from studies.monte_carlo import study as monte_carlo
+from studies.morris import report as morris_report
+from studies.morris import study as morris
 from studies.reconstruction import Comparison, reconstruct, write_reconstruction
+from studies.sobol import report as sobol_report
+from studies.sobol import study as sobol
 
 
 @dataclass(frozen=True)
@@ -45,6 +52,7 @@ PIPELINES = {
     ),
     "sobol": Pipeline(sobol.run_sobol, sobol.build_report, sobol_report.summarise),
     "morris": Pipeline(morris.run_morris, morris.build_report, morris_report.summarise),
+    "injury": Pipeline(injury.run_injury, injury.build_report, injury_report.summarise),
 }
 """A new kind of study is its modules, its class in ``mcstudy.schema`` and one line here."""
 

@@ -16,6 +16,8 @@ def main() -> None:
     _, _, case = run_case("configs/paper_case.toml")
     study = run_study("configs/paper_study.toml", quiet=False)
     drivers = run_study("configs/paper_sobol.toml", quiet=False)
+    injuries = run_study("configs/paper_injury.toml", quiet=False)
+    population = run_study("configs/population_injury.toml", quiet=False)
     hood = ResultsFolder("results/stiffness_hood_tests")
     fit_stiffness_of(Path("configs/hood_tests"), hood)
     validation = ResultsFolder("results/validation_throw")
@@ -25,10 +27,12 @@ def main() -> None:
         (case, ("kinematics.png", "head_acceleration.png", "crash.gif")),
         (study, ("distributions.png", "throw_and_wad.png", "rank_correlation.png")),
         (drivers, ("indices.png", "main_effects_hic15.png")),
+        (injuries, ("ais.png", "risk_hic15.png", "speed.png")),
         (hood, ("force_penetration.png", "corridor.png")),
     ):
         for name in names:
             shutil.copyfile(folder.path / "figures" / name, GALLERY / name)
+    shutil.copyfile(population.path / "figures" / "ais.png", GALLERY / "population_ais.png")
     shutil.copyfile(validation.path / "figures" / "throw_1.png", GALLERY / "validation_throw.png")
 
 

@@ -30,6 +30,8 @@ _RC: dict[str, Any] = {
     "svg.fonttype": "path",
     "svg.hashsalt": "mcstudy",
     "figure.dpi": 110,
+    # Titles and names come from study files: a dollar sign in them is no formula.
+    "text.parse_math": False,
 }
 
 LABELS = {

@@ -1,6 +1,6 @@
 """Assembly of a crash: body, car and initial state as the compiled core takes them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,8 @@ from models.vehicle.zones import Zones
 
 Array = NDArray[np.float64]
 
+HOOD = "hood"
+"""Zone whose forces ``hood_force_scale`` multiplies."""
 SEARCH_AHEAD = 1.5
 """m ahead of the car from which the body is brought back until it touches."""
 SEARCH_BEHIND = -0.6
@@ -201,6 +203,10 @@ def build_crash(inputs: dict[str, float], vehicle: Vehicle) -> Crash | None:
         body, neck_stiffness=inputs["neck_stiffness"], muscle_tone=inputs["muscle_tone"]
     )
     curves = [zone.corridor.curve(inputs[zone.coordinate]) for zone in vehicle.zones]
+    for k, zone in enumerate(vehicle.zones):
+        if zone.name == HOOD:
+            force = inputs["hood_force_scale"] * curves[k].force
+            curves[k] = replace(curves[k], force=force)
     ellipsoids = build_ellipsoids(body, curves)
     zones = build_zones(
         vehicle,

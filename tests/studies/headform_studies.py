@@ -27,8 +27,13 @@ from mcstudy.figures import style
 from mcstudy.report import document
 from mcstudy.results import ResultsFolder
 from models.registry import load_model
-from studies import evaluation, monte_carlo, morris, sensitivity, sobol, sobol_analysis
+from studies import evaluation
 from studies.api import PIPELINES
+from studies.monte_carlo import study as monte_carlo
+from studies.morris import study as morris
+from studies.sensitivity import measure as sensitivity
+from studies.sobol import analysis as sobol_analysis
+from studies.sobol import study as sobol
 
 SPREADS = {"impact_speed": 0.12, "headform_mass": 0.2, "hood_force_scale": 0.3}
 EXPONENTS = {

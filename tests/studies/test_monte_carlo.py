@@ -10,7 +10,7 @@ from mcstudy.errors import StudyError, UserError
 from mcstudy.results import ResultsFolder, digest
 from models.registry import load_model
 from studies.api import rerun
-from studies.monte_carlo import build_report, run_monte_carlo
+from studies.monte_carlo.study import build_report, run_monte_carlo
 
 SMALL = (
     Path("configs/paper_study.toml")

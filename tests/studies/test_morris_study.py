@@ -24,7 +24,8 @@ from headform_studies import (
 
 from mcstudy.errors import StudyError, UserError
 from mcstudy.results import ResultsFolder, digest
-from studies import api, morris_report
+from studies import api
+from studies.morris import report as morris_report
 
 BLOCK = 5
 """Rows of a trajectory: its start, three inputs and the dummy."""

@@ -29,8 +29,8 @@ from headform_studies import (
 from mcstudy.errors import UserError
 from mcstudy.results import ResultsFolder
 from mcstudy.sensitivity import delta, given_data
-from studies import sensitivity_report
-from studies.sensitivity import measure_sensitivity
+from studies.sensitivity import report as sensitivity_report
+from studies.sensitivity.measure import measure_sensitivity
 
 DESIGNS = {
     "monte-carlo": 'method = "monte-carlo"\nn = 512',
@@ -276,7 +276,7 @@ def test_a_reconstruction_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_text(Path("configs/paper_case.toml").read_text())
     answer = mcstudy("sensitivity", tmp_path)
     assert answer.code == 2
-    assert "reconstruction has no sampled inputs" in answer.err
+    assert "is the folder of a study of kind reconstruction" in answer.err
     assert not (tmp_path / "sensitivity").exists()
 
 

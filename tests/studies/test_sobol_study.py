@@ -36,8 +36,10 @@ from headform_studies import (
 from mcstudy.errors import StudyError, UserError
 from mcstudy.results import ResultsFolder, digest
 from models.registry import load_model
-from studies import api, sobol, sobol_report
+from studies import api
 from studies.failure_report import failure_map
+from studies.sobol import report as sobol_report
+from studies.sobol import study as sobol
 
 BLOCK = 6
 """Rows of a base point: A, B, three inputs and the dummy."""

@@ -11,8 +11,8 @@ from mcstudy.report import render
 from mcstudy.results import ResultsFolder
 from mcstudy.sensitivity.saltelli import draw_saltelli
 from studies.execution import load_study_model, run_rows, whole_prefix
-from studies.sobol_analysis import analyse
-from studies.sobol_report import draw, sections_of
+from studies.sobol.analysis import analyse
+from studies.sobol.report import draw, sections_of
 
 
 def run_sobol(

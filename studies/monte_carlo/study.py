@@ -16,7 +16,7 @@ from mcstudy.results import ResultsFolder
 from models.protocol import Model, complete_status
 from studies.execution import load_study_model, run_rows
 from studies.failure_report import failure_map
-from studies.monte_carlo_report import sections_of
+from studies.monte_carlo.report import sections_of
 
 
 def run_monte_carlo(

@@ -17,7 +17,7 @@ from mcstudy.sensitivity.given_data import measure_given_data
 from models.protocol import complete_status
 from studies.execution import load_study_model
 from studies.main_effects import main_effects_of
-from studies.sensitivity_report import draw, sections_of
+from studies.sensitivity.report import draw, sections_of
 
 
 def measure_sensitivity(
@@ -54,7 +54,10 @@ def measure_sensitivity(
             "report ranks them"
         )
     if not isinstance(study, MonteCarloStudy | SobolStudy):
-        raise UserError(f"{source.path}: a {study.kind} has no sampled inputs")
+        raise UserError(
+            f"{source.path}: is the folder of a study of kind {study.kind}; sensitivity is "
+            "measured in those of Monte Carlo and Sobol' studies"
+        )
     folder = out or ResultsFolder(Path(source.path) / "sensitivity")
     if folder.path.resolve() == source.path.resolve():
         raise UserError(f"{folder.path}: holds the study itself; choose another --out")

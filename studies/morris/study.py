@@ -14,7 +14,7 @@ from mcstudy.sensitivity.blocks import is_enough, whole_blocks
 from mcstudy.sensitivity.morris import ElementaryEffects, draw_trajectories, estimate_effects
 from models.protocol import Model
 from studies.execution import judge_runs, load_study_model, run_rows, whole_prefix
-from studies.morris_report import draw, sections_of
+from studies.morris.report import draw, sections_of
 
 
 def run_morris(

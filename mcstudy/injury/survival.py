@@ -1,0 +1,215 @@
+"""Injury-risk curves fitted to censored data, as ISO/TS 18506 asks for: survival analysis.
+
+Risk is the distribution of the stimulus x at which injury sets in, one of three families in its
+logarithm, F(x) = G(z) with z = intercept + slope ln x (ISO/TS 18506:2014; A. Petitjean et al.,
+Stapp Car Crash Journal 53, 2009):
+
+- log-normal: G normal; log-logistic: G logistic; Weibull: G(z) = 1 - exp(-exp(z)).
+
+An interval contributes ln(F(high) - F(low)) to the likelihood, an exact case the log density. All
+of it is concave in intercept and slope, so Newton's method finds the one maximum; for data that are
+only left- and right-censored it is that of a probit, logit or complementary log-log regression on
+ln x.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, special, stats
+
+from mcstudy.injury.observations import Observations, check
+
+Array = NDArray[np.float64]
+
+FAMILIES = ("log-normal", "log-logistic", "Weibull")
+QUALITY_AT = (0.05, 0.25, 0.5)
+"""Risks at which the quality index is given (ISO/TS 18506)."""
+QUALITY_CLASSES = ((0.5, "good"), (1.0, "fair"), (1.5, "marginal"), (np.inf, "unacceptable"))
+"""Width of the interval over the stimulus, up to which a curve is called so (ISO/TS 18506)."""
+REACH = float(stats.norm.ppf(0.975))
+"""Standard deviations of a 95 % normal interval."""
+
+
+@dataclass(frozen=True)
+class RiskFit:
+    """A fitted risk curve.
+
+    Attributes
+    ----------
+    family : one of ``FAMILIES``. intercept, slope : of z in ln x.
+    covariance : (2, 2) of intercept and slope. log_likelihood : float. cases : number.
+    """
+
+    family: str
+    intercept: float
+    slope: float
+    covariance: Array
+    log_likelihood: float
+    cases: int
+
+    @property
+    def aic(self) -> float:
+        """Akaike's information criterion."""
+        return 4.0 - 2.0 * self.log_likelihood
+
+    def risk(self, stimulus: Array) -> Array:
+        """Return the risk at each positive stimulus."""
+        return _risk(self.family, self.intercept + self.slope * np.log(stimulus))
+
+    def band(self, stimulus: Array) -> tuple[Array, Array]:
+        """Return the 95 % band of the risk, normal on the scale of z."""
+        y = np.log(stimulus)
+        z = self.intercept + self.slope * y
+        c = self.covariance
+        reach = REACH * np.sqrt(c[0, 0] + 2.0 * c[0, 1] * y + c[1, 1] * y * y)
+        return _risk(self.family, z - reach), _risk(self.family, z + reach)
+
+    def stimulus_at(self, risk: float) -> tuple[float, float, float]:
+        """Return the stimulus of a risk with its 95 % interval, normal in ln x."""
+        centre = (_score(self.family, risk) - self.intercept) / self.slope
+        gradient = np.array([1.0, centre]) / self.slope
+        reach = REACH * float(np.sqrt(gradient @ self.covariance @ gradient))
+        return (
+            float(np.exp(centre)),
+            float(np.exp(centre - reach)),
+            float(np.exp(centre + reach)),
+        )
+
+    def quality_index(self, risk: float) -> float:
+        """Return the width of the stimulus's interval over the stimulus (ISO/TS 18506)."""
+        value, low, high = self.stimulus_at(risk)
+        return (high - low) / value
+
+
+def quality_class(index: float) -> str:
+    """Return what ISO/TS 18506 calls a quality index."""
+    return next(name for limit, name in QUALITY_CLASSES if index <= limit)
+
+
+def fit_risk_curve(observations: Observations, family: str) -> RiskFit:
+    """Return the risk curve of greatest likelihood.
+
+    Parameters
+    ----------
+    observations : Observations. family : one of ``FAMILIES``.
+
+    Raises
+    ------
+    ValueError
+        If the family is unknown, the observations allow no curve (see
+        ``mcstudy.injury.observations.check``), or risk does not rise with the stimulus.
+    """
+    if family not in FAMILIES:
+        raise ValueError(f"unknown family {family!r}, choose from {', '.join(FAMILIES)}")
+    check(observations)
+    with np.errstate(divide="ignore"):
+        low, high = np.log(observations.low), np.log(observations.high)
+    exact = observations.exact
+    y = np.log(observations.stimulus)
+    middle, width = float(y.mean()), float(y.std()) or 1.0
+
+    # Centred and scaled, so that the two parameters hardly depend on each other.
+    low, high = (low - middle) / width, (high - middle) / width
+
+    def loss(p: Array) -> tuple[float, Array]:
+        total, gradient, _ = _likelihood(family, p, low, high, exact)
+        return -total, -gradient
+
+    def curvature(p: Array) -> Array:
+        return -_likelihood(family, p, low, high, exact)[2]
+
+    start: Array = np.array([_score(family, float(observations.injured.mean())), 1.0])
+    found = optimize.minimize(loss, start, method="trust-exact", jac=True, hess=curvature, tol=1e-9)
+    best = np.asarray(found.x)
+    total = _likelihood(family, best, low, high, exact)[0]
+    if not (np.isfinite(total) and best[1] > 0.0):
+        raise ValueError("risk does not rise with the stimulus: no curve is given")
+    # Back to ln x: z = a + b (y - middle) / width.
+    back = np.array([[1.0, -middle / width], [0.0, 1.0 / width]])
+    intercept, slope = back @ best
+    covariance = back @ np.linalg.inv(curvature(best)) @ back.T
+    # The density of an exact case is one in x, not in the scaled ln x.
+    total -= float(exact.sum()) * np.log(width) + float(np.log(observations.high[exact]).sum())
+    return RiskFit(family, float(intercept), float(slope), covariance, total, observations.size)
+
+
+def _likelihood(
+    family: str, parameters: Array, low: Array, high: Array, exact: NDArray[np.bool_]
+) -> tuple[float, Array, Array]:
+    """Return log likelihood, gradient (2,) and Hessian (2, 2) in intercept and slope."""
+    a, b = parameters
+    if exact.any() and b <= 0.0:
+        return -np.inf, np.zeros(2), -np.eye(2)
+    gradient, hessian = np.zeros(2), np.zeros((2, 2))
+    total = 0.0
+    if exact.any():
+        y = high[exact]
+        log_density, first, second = _density(family, a + b * y)
+        rows = np.stack([np.ones_like(y), y])
+        total += float(log_density.sum() + y.size * np.log(b))
+        gradient += rows @ first + np.array([0.0, y.size / b])
+        hessian += (rows * second) @ rows.T - np.diag([0.0, y.size / b**2])
+    y1, y2 = low[~exact], high[~exact]
+    log_share = _log_between(family, y1, y2, a, b)
+    total += float(log_share.sum())
+    sides = []
+    for y in (y1, y2):
+        finite = np.isfinite(y)
+        held = np.where(finite, y, 0.0)
+        log_density, first, _ = _density(family, a + b * held)
+        ratio = np.where(finite, np.exp(log_density - log_share), 0.0)
+        sides.append((ratio, ratio * first, np.stack([np.ones_like(held), held])))
+    (r1, d1, rows1), (r2, d2, rows2) = sides
+    gradient += rows2 @ r2 - rows1 @ r1
+    cross = (rows1 * (r1 * r2)) @ rows2.T
+    hessian += (rows2 * (d2 - r2**2)) @ rows2.T - (rows1 * (d1 + r1**2)) @ rows1.T + cross + cross.T
+    return total, gradient, hessian
+
+
+def _log_between(family: str, y1: Array, y2: Array, a: float, b: float) -> Array:
+    """Return ln(F(y2) - F(y1)), from the tail in which it keeps its digits."""
+    z1 = np.where(np.isfinite(y1), a + b * np.where(np.isfinite(y1), y1, 0.0), -np.inf)
+    z2 = np.where(np.isfinite(y2), a + b * np.where(np.isfinite(y2), y2, 0.0), np.inf)
+    low1, up1 = _log_tails(family, z1)
+    low2, up2 = _log_tails(family, z2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        from_below = low2 + np.log1p(-np.exp(low1 - low2))
+        from_above = up1 + np.log1p(-np.exp(up2 - up1))
+    return np.where(z1 > 0.0, from_above, from_below)
+
+
+def _log_tails(family: str, z: Array) -> tuple[Array, Array]:
+    """Return ln G(z) and ln(1 - G(z))."""
+    if family == "log-normal":
+        return special.log_ndtr(z), special.log_ndtr(-z)
+    if family == "log-logistic":
+        return special.log_expit(z), special.log_expit(-z)
+    hazard = np.exp(np.minimum(z, 700.0))
+    with np.errstate(divide="ignore"):
+        return np.log(-np.expm1(-hazard)), -hazard
+
+
+def _density(family: str, z: Array) -> tuple[Array, Array, Array]:
+    """Return the log density at z and its first and second derivative."""
+    if family == "log-normal":
+        return -0.5 * z * z - 0.5 * np.log(2.0 * np.pi), -z, np.full_like(z, -1.0)
+    if family == "log-logistic":
+        share = special.expit(z)
+        below, above = _log_tails(family, z)
+        return below + above, 1.0 - 2.0 * share, -2.0 * share * (1.0 - share)
+    hazard = np.exp(np.minimum(z, 700.0))
+    return z - hazard, 1.0 - hazard, -hazard
+
+
+def _risk(family: str, z: Array) -> Array:
+    return np.exp(_log_tails(family, z)[0])
+
+
+def _score(family: str, risk: float) -> float:
+    """Return z at a risk."""
+    if family == "log-normal":
+        return float(special.ndtri(risk))
+    if family == "log-logistic":
+        return float(special.logit(risk))
+    return float(np.log(-np.log1p(-risk)))

@@ -1,0 +1,62 @@
+"""The cells of an injury study: every scenario with every car front."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mcstudy.config import InjuryStudy, MonteCarloStudy
+from mcstudy.results import ResultsFolder
+from mcstudy.schema import AS_IT_STANDS, REFERENCE, Front, Report, Scenario
+
+BATCHES = 20
+"""Parts of an independent sample between which intervals are taken (assumed)."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One scenario with one car front: a Monte Carlo study, and what the scenario fixes in it."""
+
+    scenario: str
+    front: str
+    study: MonteCarloStudy
+    changes: Scenario
+
+    def folder(self, study_folder: ResultsFolder) -> ResultsFolder:
+        """Return the cell's own folder."""
+        return ResultsFolder(study_folder.path / "cells" / self.scenario / self.front)
+
+
+def cells_of(study: InjuryStudy) -> Iterator[Cell]:
+    """Yield the cells of a study, the reference scenario first."""
+    scenarios = {REFERENCE: Scenario(title=AS_IT_STANDS)} | study.scenarios
+    for scenario, changes in scenarios.items():
+        for front, entry in fronts_of(study).items():
+            model = study.model.model_copy(update={"options": study.model.options | entry.options})
+            yield Cell(
+                scenario,
+                front,
+                MonteCarloStudy(
+                    format=study.format, kind="monte-carlo", name=study.name, title=study.title,
+                    seed=study.seed, model=model, fixed=study.fixed, design=study.design,
+                    inputs=study.inputs | changes.inputs, dependence=study.dependence,
+                    max_failure_rate=study.max_failure_rate, report=Report(histories=0),
+                ),
+                changes,
+            )  # fmt: skip
+
+
+def fronts_of(study: InjuryStudy) -> dict[str, Front]:
+    """Return the car fronts: those of the study, or the model's own."""
+    return study.fronts or {"car": Front()}
+
+
+def batch_of(study: InjuryStudy, part: pd.DataFrame) -> NDArray[np.int64]:
+    """Return the independent part of the design that each run belongs to, (n,).
+
+    Replicates are such parts; of independent runs any are, so they are cut into twenty.
+    """
+    size = study.design.size if study.design.size > 1 else max(1, study.design.n // BATCHES)
+    return part["run"].to_numpy(dtype=np.int64) // size

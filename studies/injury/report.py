@@ -1,0 +1,377 @@
+"""The report of an injury study: outcomes, limits and curves, in words, tables and pictures."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mcstudy.config import InjuryStudy
+from mcstudy.figures import risk, style
+from mcstudy.injury.functions import RiskFunction, speed_curves
+from mcstudy.report import Section, Table
+from mcstudy.schema import REFERENCE
+from mcstudy.text import interval, number, percent
+from studies.failure_report import failure_map, failures_said, status_table
+from studies.injury.analysis import ages_of, proportional
+
+FEW = 1000.0
+"""Impacts that counts of injured are given for."""
+
+
+def draw(
+    study: InjuryStudy,
+    cases: pd.DataFrame,
+    analysis: Mapping[str, Any],
+    functions: Mapping[str, RiskFunction],
+) -> dict[str, Any]:
+    """Return the study's figures by file name."""
+    scenarios = analysis["scenarios"]
+    reference = cases[cases["scenario"] == REFERENCE]
+    bars = {entry["title"]: entry["ais"] for entry in scenarios.values()}
+    bars |= {
+        f"{style.words(words)}, alone": shares
+        for words, shares in scenarios[REFERENCE]["mechanisms"].items()
+        if len(study.mechanisms) > 1
+    }
+    figures: dict[str, Any] = failure_map(analysis) | {"ais": risk.draw_ais(bars)}
+    age = np.array([float(np.median(ages_of(study, reference)))])
+    for stimulus in dict.fromkeys(function.stimulus for function in functions.values()):
+        held = reference[stimulus].dropna().to_numpy(dtype=float)
+        if held.size < 2:
+            continue
+        x = np.linspace(0.0, float(np.quantile(held, 0.995)) * 1.15, 300)[1:]
+        mine = {key: f for key, f in functions.items() if f.stimulus == stimulus}
+        curves = {
+            f.title: {level: f.risk(level, x, age) for level in f.levels} for f in mine.values()
+        }
+        unit = next(iter(mine.values())).unit
+        limit = study.limit.value if stimulus == study.limit.output else None
+        figures[f"risk_{stimulus}"] = risk.draw_levels(
+            curves, x, held, style.label(stimulus, unit), limit
+        )
+    figures["exceedance"] = risk.draw_exceedance(
+        {
+            entry["title"]: proportional(cases[cases["scenario"] == name], analysis["fronts"])[
+                study.limit.output
+            ].to_numpy(float)
+            for name, entry in scenarios.items()
+        },
+        style.label(study.limit.output, analysis["limit"]["unit"]),
+        study.limit.value,
+    )
+    rocs = _judged(analysis)
+    if rocs:
+        figures["roc"] = risk.draw_roc(
+            {
+                title: (np.array(e["roc"]["false_alarm"]), np.array(e["roc"]["sensitivity"]))
+                for title, e in rocs.items()
+            },
+            {
+                title: (1.0 - e["specificity"]["value"], e["sensitivity"]["value"])
+                for title, e in rocs.items()
+            },
+            f"limit {study.limit.value:g}",
+        )
+    if analysis["speed"]:
+        figures["speed"] = _draw_speed(analysis["speed"])
+    return figures
+
+
+def _draw_speed(speed: Mapping[str, Any]) -> Any:
+    x = np.array(speed["speed"], dtype=float)
+    bands = {
+        name: {"speed": x} | {key: np.array(curve[key], dtype=float) for key in curve}
+        for name, curve in speed["curves"].items()
+    }
+    grid = np.linspace(max(5.0, float(x[0])), float(x[-1]), 100)
+    published = {c.title: (grid, c.risk(grid)) for c in speed_curves()}
+    return risk.draw_speed_risk(bands, published, "risk against impact speed")
+
+
+def sections_of(
+    study: InjuryStudy,
+    analysis: Mapping[str, Any],
+    figures: Mapping[str, Any],
+    functions: Mapping[str, RiskFunction],
+) -> list[Section]:
+    """Return the sections of the report."""
+    scenarios = analysis["scenarios"]
+
+    def one(name: str, caption: str) -> dict[str, Any]:
+        return {caption: figures[name]} if name in figures else {}
+
+    return [
+        Section(
+            "Outcomes", summarise(analysis), _outcome_tables(analysis),
+            one("ais", "Distribution of the AIS of the head, by scenario and by mechanism."),
+        ),
+        Section("Observed injuries, and the speed that would have halved the risk",
+                _observed_said(analysis), _halved_tables(analysis)),
+        Section(
+            "The choice of the risk function",
+            ("Which published function is right nobody knows; the choice is an uncertain input. "
+             "Each alone, over the same runs:",),
+            [_function_table(analysis)],
+            {
+                f"Published risk of {style.words(name.removeprefix('risk_'))} by AIS level at the "
+                "study's median age, over the density of the runs.": figure
+                for name, figure in figures.items() if name.startswith("risk_")
+            },
+        ),
+        Section(
+            f"The limit: {style.words(study.limit.output)} {study.limit.value:g}",
+            _limit_said(analysis),
+            [_limit_table(analysis)],
+            one("exceedance", "Share of the runs above each value, with a 95 % band for the whole "
+                "curve (as if the runs were independent).")
+            | one("roc", "Sensitivity over false alarms for all limits."),
+        ),
+        Section("What goes with the AIS", (
+            "Rank correlations with the drawn AIS of the head, and the factor on the odds of a "
+            "worse AIS for one standard deviation (proportional-odds regression, all predictors "
+            "together). Intervals are 95 %.",),
+            [_association_table(entry) for entry in scenarios.values()]),
+        Section("Risk against impact speed", _speed_said(analysis), (), one(
+            "speed", "Means over bins of the speed, made to rise, with 95 % bands. Grey: published "
+            "curves, for adults and other injuries, to compare the shape.")),
+        Section(
+            "How the numbers came about",
+            [*_honesty(study, functions), *failures_said(analysis)],
+            [status_table(analysis)],
+            one("failures", "Share of failed runs in each tenth of each input."),
+        ),
+    ]  # fmt: skip
+
+
+def summarise(analysis: Mapping[str, Any]) -> list[str]:
+    """Return the outcome in words."""
+    level = str(analysis["limit"]["level"])
+    scenarios = analysis["scenarios"]
+    first = scenarios[REFERENCE]["at_least"][level]
+    lines = [f"Of {FEW:,.0f} impacts {_count(first)} leave a head injury of AIS {level} or worse."]
+    for name, entry in scenarios.items():
+        if name == REFERENCE:
+            continue
+        lines.append(
+            f"{_capital(entry['title'])}: {_count(entry['at_least'][level])}, "
+            f"{_changed(entry['difference'][level])}."
+        )
+    return lines
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _changed(change: Mapping[str, float | None]) -> str:
+    """Say how many fewer or more."""
+    value, low, high, relative = (change[k] for k in ("value", "low", "high", "relative"))
+    assert value is not None
+    verb = "fewer" if value < 0.0 else "more"
+    percentage = "" if relative is None else f" ({100.0 * relative:+.0f} %)"
+    if low is None or high is None:
+        return f"{_count({'value': abs(value), 'low': None, 'high': None})} {verb}{percentage}"
+    if low <= 0.0 <= high:
+        return "no difference that can be told from none"
+    ends = sorted((abs(low), abs(high)))
+    size = {"value": abs(value), "low": ends[0], "high": ends[1]}
+    return f"{_count(size)} {verb}{percentage}"
+
+
+def _count(estimate: Mapping[str, float | None]) -> str:
+    """Return how many in a thousand, with the interval."""
+    shown = []
+    for key in ("value", "low", "high"):
+        side = estimate[key]
+        count = float("nan") if side is None else FEW * side
+        shown.append(f"{count:,.0f}" if abs(count) >= 10.0 else f"{count:.1f}")
+    value, low, high = (text.replace("-0.0", "0.0").replace("nan", "–") for text in shown)
+    return value if "–" in (low, high) else f"{value} ({low} to {high})"
+
+
+def _spread(estimate: Mapping[str, float | None]) -> str:
+    """Return a probability with half its interval."""
+    value, low, high = (estimate[key] for key in ("value", "low", "high"))
+    if value is None:
+        return "–"
+    if low is None or high is None:
+        return f"{100.0 * value:.1f} %"
+    if low <= 0.0 or high >= 1.0:
+        # An interval that ends at a border is no half on either side.
+        return f"{100.0 * value:.1f} ({100.0 * low:.1f} to {100.0 * high:.1f}) %"
+    return f"{100.0 * value:.1f} ± {50.0 * (high - low):.1f} %"
+
+
+def _by_level(caption: str, columns: Mapping[str, Mapping[str, Any]]) -> Table:
+    """Return a table of counts with a row an AIS level."""
+    rows = [
+        [f"AIS {level}+", *(_count(column[str(level)]) for column in columns.values())]
+        for level in range(1, 7)
+    ]
+    return Table(caption, ["", *columns], rows)
+
+
+def _outcome_tables(analysis: Mapping[str, Any]) -> list[Table]:
+    scenarios = analysis["scenarios"]
+    tables = [
+        _by_level(
+            f"Head injuries in {FEW:,.0f} impacts (95 % interval).",
+            {entry["title"]: entry["at_least"] for entry in scenarios.values()},
+        )
+    ]
+    changed = {e["title"]: e["difference"] for e in scenarios.values() if "difference" in e}
+    if changed:
+        tables.append(
+            _by_level("Difference to the study as it stands, with the same draws.", changed)
+        )
+    if len(analysis["fronts"]) > 1:
+        level = analysis["limit"]["level"]
+        rows = [
+            [entry["title"], *(_count(e) for e in entry["by_front"].values())]
+            for entry in scenarios.values()
+        ]
+        names = [f"{name} ({100.0 * share:.0f} %)" for name, share in analysis["fronts"].items()]
+        caption = f"AIS {level}+ in {FEW:,.0f} impacts by car front (share of the impacts)."
+        tables.append(Table(caption, ["scenario", *names], rows))
+    return tables
+
+
+def _observed_said(analysis: Mapping[str, Any]) -> list[str]:
+    observed = analysis["observed"]
+    if not observed["injuries"]:
+        return ["The study file names no injuries of a real case."]
+    lines = []
+    for entry in observed["injuries"]:
+        low, high = entry["central_90"]
+        by = ", ".join(
+            f"{100.0 * value:.0f} % by {analysis['functions'][name]['title']}"
+            for name, value in entry["by_function"].items()
+        )
+        label = _capital(entry["label"])
+        lines.append(
+            f"{label} (AIS {entry['level']}): its probability was "
+            f"{percent(entry['probability'])}; over nine runs in ten it lies between "
+            f"{100.0 * low:.0f} and {100.0 * high:.0f} %."
+            + (f" By risk function: {by}." if by else "")
+        )
+    if "all" in observed:
+        both = observed["all"]
+        lines.append(
+            f"All of them together: {percent(both['independent'])} if each run's risks are "
+            f"independent, {percent(both['dependent'])} if they go together."
+        )
+    return lines
+
+
+def _halved_tables(analysis: Mapping[str, Any]) -> list[Table]:
+    speed = analysis["speed"]
+    if not speed:
+        return []
+    rows = [
+        [name, f"{100.0 * entry['now']:.0f} %", interval(entry)]
+        for name, entry in speed["halved"].items()
+    ]
+    caption = (
+        "The impact speed that would have halved the risk; the median of the case is "
+        f"{number(speed['reference_speed'])} km/h. '–': beyond the speeds of the study."
+    )
+    return [Table(caption, ["injury", "risk as it stands", "halved at [km/h] (95 %)"], rows)]
+
+
+def _function_table(analysis: Mapping[str, Any]) -> Table:
+    rows = [
+        [entry["title"], entry["label"],
+         *(_spread(entry["at_least"][str(k)]) if str(k) in entry["at_least"] else ""
+           for k in range(1, 7))]
+        for entry in analysis["functions"].values()
+    ]  # fmt: skip
+    head = ["risk function", "read", *(f"AIS {k}+" for k in range(1, 7))]
+    return Table("Mean risk in the study as it stands (95 % interval of the mean).", head, rows)
+
+
+def _judged(analysis: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Return the limit's judgements by scenario and what it is held against."""
+    level = analysis["limit"]["level"]
+    return {
+        f"AIS {level}+ {style.words(words)}, {entry['title']}": judged
+        for entry in analysis["scenarios"].values()
+        for words, judged in entry["limit"].items()
+        if judged
+    }
+
+
+def _limit_said(analysis: Mapping[str, Any]) -> list[str]:
+    limit = analysis["limit"]
+    lines = []
+    for entry in analysis["scenarios"].values():
+        said = f"{_capital(entry['title'])}: " + (
+            f"{percent(entry['above_limit'])} of the runs exceed {limit['value']:g}"
+        )
+        judged = next(iter(entry["limit"].values()))
+        if judged:
+            said += (
+                f"; as a test of AIS {limit['level']}+ of the head the limit finds "
+                f"{percent(judged['sensitivity'])} of the injured; by these risk functions the "
+                f"best one (Youden) would be {number(judged['best'])}"
+            )
+        lines.append(said + ".")
+    return lines
+
+
+def _limit_table(analysis: Mapping[str, Any]) -> Table:
+    rows = [
+        [words,
+         *(_spread(judged[k]) for k in ("sensitivity", "specificity", "positive", "negative")),
+         interval(judged["area"], 2), number(judged["best"])]
+        for words, judged in _judged(analysis).items()
+    ]  # fmt: skip
+    head = ["test of", "sensitivity", "specificity", "PPV (risk above)",
+            "NPV (uninjured below)", "ROC area", "best limit"]  # fmt: skip
+    return Table("The limit as a classifier (95 % intervals); outcomes count by their "
+                 "probability.", head, rows)  # fmt: skip
+
+
+def _association_table(entry: Mapping[str, Any]) -> Table:
+    found = entry["association"]
+    rows = [
+        [style.words(name), interval(pair["spearman"], 2), interval(pair["kendall"], 2),
+         interval(found["odds"][name], 2) if found["odds"] else "–"]
+        for name, pair in found["rank"].items()
+    ]  # fmt: skip
+    caption = f"{entry['title']}: {found['runs']:,} runs."
+    if found["odds"]:
+        caption += f" The regression explains {100.0 * found['explained']:.0f} % (McFadden)."
+    return Table(caption, ["", "Spearman's rho", "Kendall's tau", "odds ratio per sd"], rows)
+
+
+def _speed_said(analysis: Mapping[str, Any]) -> list[str]:
+    speed = analysis["speed"]
+    if not speed:
+        return ["No curve: the study does not vary the impact speed, or has too few runs for one."]
+    return [
+        f"From {speed['runs']:,} runs of all scenarios that change the speed alone. The published "
+        "curves are for pedestrians of 15 years and more and for death or any severe injury."
+    ]
+
+
+def _honesty(study: InjuryStudy, functions: Mapping[str, RiskFunction]) -> list[str]:
+    together = (
+        "The head takes the larger risk of its mechanisms (they go together), which is the least "
+        "that it can be."
+        if study.together == "dependent"
+        else "The mechanisms are taken as independent, which is the most that the risk can be."
+    )
+    lines = [
+        "Every run's risk of AIS k or worse is the mean of the risk functions of a mechanism with "
+        "the weights of the study file; a function without a level leaves it to the others. "
+        + together,
+        "Adult functions are carried to the child by the age: HIC by the factors of the Q dummies, "
+        "rotation by the mass of the brain to the power 2/3 (acceleration) or 1/3 (velocity). No "
+        "contact of the head with the car counts as no risk.",
+        "Intervals are 95 % t intervals between the independent parts of the design. They count "
+        "the sampling error only: not what the model gets wrong, and not whether the risk "
+        "functions are right.",
+    ]
+    lines += [f"{f.title}: {f.source} [{f.label}]" for f in functions.values()]
+    return lines

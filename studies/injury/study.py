@@ -1,0 +1,220 @@
+"""The injury study: from runs to AIS outcomes, for scenarios and car fronts.
+
+Every scenario meets every car front in a *cell*: the same draws of everything that the scenario
+does not change, so that differences between scenarios are sharp. Cells lie in folders of their own.
+"""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mcstudy import config, designs
+from mcstudy.config import InjuryStudy, load_study
+from mcstudy.errors import UserError
+from mcstudy.failures import locate_failures
+from mcstudy.figures import style
+from mcstudy.injury.functions import RiskFunction, risk_function
+from mcstudy.progress import say
+from mcstudy.report import render
+from mcstudy.results import ResultsFolder, check_failures, digest
+from models.protocol import Model, complete_status
+from studies.execution import load_study_model, run_rows
+from studies.injury.analysis import analyse, outcomes_of
+from studies.injury.cells import Cell, cells_of
+from studies.injury.report import draw, sections_of
+from studies.risk_curve import CASES
+
+Array = NDArray[np.float64]
+
+
+def run_injury(
+    study: InjuryStudy,
+    text: str,
+    folder: ResultsFolder,
+    *,
+    workers: int = -1,
+    quiet: bool = False,
+) -> dict[str, Any]:
+    """Run all cells of a study, or go on with them, and write its results folder.
+
+    Parameters
+    ----------
+    study : InjuryStudy
+    text : the study file as written. folder : ResultsFolder
+    workers : processes, -1 for one a core. quiet : no progress line.
+
+    Returns
+    -------
+    dict
+        The analysis, as in ``analysis.json``.
+
+    Raises
+    ------
+    UserError
+        If the study does not fit the model or the folder.
+    StudyError
+        If too many runs failed.
+    """
+    prepared = [_prepare(study, cell, folder) for cell in cells_of(study)]
+    n = study.design.n
+    manifest: dict[str, Any] = {
+        "format": "mcstudy-results/1",
+        "study": study.name,
+        "kind": study.kind,
+        "seed": study.seed,
+        "design": {
+            "method": study.design.method,
+            "n": n * len(prepared),
+            "cells": [f"{cell.scenario}/{cell.front}" for cell, _, _ in prepared],
+        },
+        "finished": False,
+    }
+    with folder.open_for_writing():
+        folder.write_text("study.toml", text)
+        folder.write_json("manifest.json", manifest)
+        digests, counts = {}, pd.Series(dtype=int)
+        for cell, model, columns in prepared:
+            say(f"{cell.scenario}, {cell.front}:", quiet=quiet)
+            inner = cell.folder(folder)
+            fixed = cell.study.fixed | cell.changes.fixed
+            with inner.open_for_writing():
+                runs = run_rows(
+                    cell.study.model_copy(update={"fixed": fixed}), model, columns, inner,
+                    design={"method": study.design.method, "n": n,
+                            "replicate_size": study.design.size},
+                    replicate=np.arange(n) // study.design.size, workers=workers, quiet=quiet,
+                )  # fmt: skip
+            digests[f"{cell.scenario}/{cell.front}"] = digest(runs)
+            counts = counts.add(runs["status"].value_counts(), fill_value=0)
+        manifest |= {
+            "counts": {str(k): int(v) for k, v in counts.items()},
+            "digests": digests,
+            "finished": True,
+        }
+        folder.write_json("manifest.json", manifest)
+        return build_report(folder)
+
+
+def build_report(folder: ResultsFolder) -> dict[str, Any]:
+    """Analyse a results folder and write its figures and report, without running the model.
+
+    Raises
+    ------
+    UserError
+        If the folder is not one of a finished injury study.
+    StudyError
+        If too many runs failed.
+    """
+    study = load_study(folder.path / "study.toml")
+    if not isinstance(study, InjuryStudy):
+        raise UserError(f"{folder.path}: is not the folder of an injury study")
+    model = load_study_model(study)
+    functions = check_functions(study, model)
+    frames = []
+    for cell in cells_of(study):
+        runs = cell.folder(folder).runs()
+        runs = runs[runs["run"] < study.design.n]
+        if len(runs) < study.design.n:
+            raise UserError(
+                f"{cell.folder(folder).path}: {len(runs)} of {study.design.n} runs are done; run "
+                "the study again to go on"
+            )
+        frames.append(runs.assign(scenario=cell.scenario, front=cell.front))
+    runs = pd.concat(frames, ignore_index=True)
+    ended, complete = judge_injury_runs(study, model, runs)
+    cases = outcomes_of(study, runs[complete], functions)
+    folder.write_frame(CASES, cases)
+    folder.write_json("analysis.json", ended | analyse(study, model, cases, functions))
+    analysis = folder.read_json("analysis.json")
+    figures = draw(study, cases, analysis, functions)
+    style.save(figures, folder.path / "figures")
+    sections = sections_of(study, analysis, figures, functions)
+    subtitle = (
+        f"Injury study of {len(runs):,} runs of the {study.model.name} model, "
+        f"{len(analysis['scenarios'])} scenario(s), {len(analysis['fronts'])} car front(s), "
+        f"seed {study.seed}"
+    )
+    folder.write_text("report.html", render(study.title, subtitle, sections))
+    return analysis
+
+
+def judge_injury_runs(
+    study: InjuryStudy, model: Model, runs: pd.DataFrame
+) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+    """Return how the runs ended, and (n,) which are complete.
+
+    Raises
+    ------
+    StudyError
+        If more runs failed than the study allows.
+    """
+    complete: NDArray[np.bool_] = runs["status"].isin(complete_status(model)).to_numpy(dtype=bool)
+    counts = {str(k): int(v) for k, v in runs["status"].value_counts().items()}
+    check_failures(counts, set(counts) - complete_status(model), study.max_failure_rate)
+    ended = {
+        "kind": study.kind,
+        "runs": len(runs),
+        "status": counts,
+        "failures": locate_failures(runs[list(study.inputs)], ~complete),
+    }
+    return ended, complete
+
+
+def check_functions(study: InjuryStudy, model: Model) -> dict[str, RiskFunction]:
+    """Return the study's risk functions by name.
+
+    Raises
+    ------
+    UserError
+        If one is unknown, or the model lacks its stimulus or gives it in another unit.
+    """
+    known = {item.name: item.unit for item in model.outputs}
+    found = {}
+    for mechanism, entry in study.mechanisms.items():
+        place = f"mechanisms.{mechanism}.functions"
+        for name in entry.functions:
+            try:
+                function = risk_function(name)
+            except ValueError as error:
+                raise UserError(f"{place}: {error}") from None
+            if known.get(function.stimulus) != function.unit:
+                raise UserError(
+                    f"{place}.{name}: takes {function.stimulus} in {function.unit}, which model "
+                    f"{model.name!r} does not give"
+                )
+            found[name] = function
+    config.check_outputs([study.limit.output], model, "limit.output")
+    has_age = "age" in {item.name for item in model.inputs}
+    if study.age is None and not has_age:
+        raise UserError(f"age: model {model.name!r} has no input 'age'; give it in years")
+    if study.age is not None and has_age:
+        raise UserError(f"age: model {model.name!r} has an input 'age'; sample or fix that")
+    return found
+
+
+def _prepare(
+    study: InjuryStudy, cell: Cell, folder: ResultsFolder
+) -> tuple[Cell, Model, dict[str, Array]]:
+    """Return a cell with its model and the values of every input.
+
+    Raises
+    ------
+    UserError
+        Naming the cell, if it does not fit the model or its folder.
+    """
+    try:
+        model = load_study_model(cell.study)
+        check_functions(study, model)
+        design = study.design
+        uniforms = designs.draw(design.method, design.n, design.size, len(study.inputs), study.seed)
+        columns = config.map_inputs(cell.study, model, uniforms)
+        fixed = cell.study.model_copy(update={"fixed": cell.changes.fixed})
+        for name, value in config.fixed_values(fixed, model).items():
+            columns[name] = np.full(design.n, value)
+        merged = cell.study.model_copy(update={"fixed": cell.study.fixed | cell.changes.fixed})
+        cell.folder(folder).check_same_study(config.numbers_digest(merged, model))
+    except UserError as error:
+        raise UserError(f"scenario {cell.scenario}, front {cell.front}: {error}") from None
+    return cell, model, columns

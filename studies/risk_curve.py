@@ -1,0 +1,191 @@
+"""Injury-risk curves fitted to a table of cases, a user's or a study's."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from mcstudy import units
+from mcstudy.config import InjuryStudy, load_study
+from mcstudy.errors import UserError
+from mcstudy.figures import risk, style
+from mcstudy.injury.cases import observations_of, read_table
+from mcstudy.injury.risk_curve import INFLUENTIAL, describe_risk
+from mcstudy.report import Section, Table, render
+from mcstudy.results import ResultsFolder
+from mcstudy.schema import REFERENCE
+from mcstudy.text import interval, number, unit
+from studies.execution import load_study_model
+from studies.injury.analysis import proportional
+from studies.injury.cells import fronts_of
+
+CASES = "cases.parquet"
+"""What an injury study leaves for this in its folder."""
+
+
+def fit_risk_curves(
+    source: Path,
+    stimulus: str,
+    folder: ResultsFolder,
+    *,
+    level: int = 3,
+    scenario: str | None = None,
+) -> dict[str, Any]:
+    """Fit injury-risk curves to cases and write a report of them.
+
+    Parameters
+    ----------
+    source : CSV or Parquet table of cases, or the folder of an injury study.
+    stimulus : column.
+    folder : where the report goes.
+    level : AIS from which a case counts as injured, where the table has a column ``ais``.
+    scenario : of an injury study; by default the study as it stands.
+
+    Returns
+    -------
+    dict
+        The analysis, as in ``analysis.json``.
+
+    Raises
+    ------
+    UserError
+        If the table is wrong or allows no curve.
+    """
+    if source.is_dir() and folder.path.resolve() == source.resolve():
+        raise UserError(f"{folder.path}: holds the study itself; choose another --out")
+    table, named = _read(source, stimulus, scenario)
+    observations = observations_of(table.reset_index(drop=True), stimulus, level, str(source))
+    try:
+        found = describe_risk(observations)
+    except ValueError as error:
+        raise UserError(f"{source}: {error}") from None
+    plain = "injured" in table.columns or f"{stimulus}_low" in table.columns
+    injury = "injury" if plain else f"AIS{level}+"
+    with folder.open_for_writing():
+        folder.write_json(
+            "analysis.json",
+            {"source": str(source), "stimulus": stimulus, "unit": named, "injury": injury} | found,
+        )
+        analysis = folder.read_json("analysis.json")
+        xlabel = style.words(stimulus) if named is None else style.label(stimulus, named)
+        figure = risk.draw_risk_curve(analysis, xlabel, f"risk of {injury}")
+        style.save({"risk_curve": figure}, folder.path / "figures")
+        subtitle = f"{analysis['cases']:,} cases of {source.name}, {analysis['injured']:,} injured"
+        section = Section(
+            "Risk curve", summarise(analysis), tables(analysis),
+            {"Risk with its 95 % band, the cases, the estimate without a family, and the stimuli "
+             "at 5, 25 and 50 % risk.": figure},
+        )  # fmt: skip
+        how = Section("How the curve was fitted", _method(analysis))
+        title = f"Risk of {injury} against {style.words(stimulus)}"
+        folder.write_text("report.html", render(title, subtitle, [section, how]))
+    return analysis
+
+
+def _read(source: Path, stimulus: str, scenario: str | None) -> tuple[pd.DataFrame, str | None]:
+    """Return the table of cases, and the unit of the stimulus where a study tells it.
+
+    Of a study's cases one scenario is taken, its car fronts in proportion to their shares: others
+    are the same people once more.
+    """
+    if not source.is_dir():
+        if scenario is not None:
+            raise UserError(f"{source}: is no injury study, it has no scenario {scenario!r}")
+        return read_table(source), None
+    study = load_study(source / "study.toml")
+    if not isinstance(study, InjuryStudy):
+        raise UserError(f"{source}: is not the folder of an injury study")
+    table = read_table(source / CASES)
+    wanted = scenario or REFERENCE
+    if wanted not in set(table["scenario"]):
+        names = ", ".join(map(str, table["scenario"].unique()))
+        raise UserError(f"{source}: has no scenario {wanted!r}, only {names}")
+    shares = {name: front.share for name, front in fronts_of(study).items()}
+    table = proportional(table[table["scenario"] == wanted], shares)
+    model = load_study_model(study)
+    known = {item.name: item.unit for item in model.inputs}
+    known |= {item.name: item.unit for item in model.outputs}
+    if stimulus not in known:
+        return table, None
+    named = known[stimulus]
+    if stimulus in study.inputs:
+        # People read an input in the unit that the study file gives it in.
+        shown = study.inputs[stimulus].unit
+        table[stimulus] /= units.factor(shown, named)
+        named = shown
+    # A blow that did not happen is no case.
+    return table[table[stimulus].notna()], named
+
+
+def summarise(analysis: Mapping[str, Any]) -> list[str]:
+    """Return the result in words."""
+    unit_text = f" {unit(analysis['unit'])}".rstrip() if analysis["unit"] else ""
+    half, quarter, few = (
+        f"{interval(analysis['at'][p])}{unit_text}" for p in ("0.5", "0.25", "0.05")
+    )
+    lines = [
+        f"Half are injured ({analysis['injury']}) at "
+        f"{style.words(analysis['stimulus'])} {half}, one in four at {quarter}, one in twenty at "
+        f"{few} ({analysis['family']} curve, {analysis['cases']:,} cases, "
+        f"{analysis['injured']:,} injured)."
+    ]
+    influence = analysis["influence"]
+    if influence is not None and influence["influential"]:
+        worst = influence["largest"][0]
+        moved = (
+            "leaves no curve"
+            if worst["shift"] is None
+            else f"moves it by {number(abs(worst['shift']), 2)} standard errors"
+        )
+        lines.append(
+            f"{influence['influential']} case(s) carry the curve: leaving out case "
+            f"{worst['case']} {moved}."
+        )
+    return lines
+
+
+def tables(analysis: Mapping[str, Any]) -> list[Table]:
+    """Return quality of the best curve and comparison of the families."""
+    points = [
+        [f"{100 * float(p):g} %", interval(entry), number(entry["quality_index"], 2),
+         entry["quality"]]
+        for p, entry in analysis["at"].items()
+    ]  # fmt: skip
+    families = [
+        [name, number(entry["aic"], 5), number(entry["log_likelihood"], 5),
+         number(entry["median"]), number(entry["intercept"], 4), number(entry["slope"], 4)]
+        for name, entry in analysis["families"].items()
+    ]  # fmt: skip
+    return [
+        Table(
+            f"{analysis['family']} curve: stimulus at three risks, and its quality index.",
+            ["risk", "stimulus (95 %)", "quality index", "class"],
+            points,
+        ),
+        Table(
+            "Families, best first.",
+            ["family", "AIC", "log likelihood", "median", "intercept", "slope in ln x"],
+            families,
+        ),
+    ]
+
+
+def _method(analysis: Mapping[str, Any]) -> list[str]:
+    exact = analysis["exact"]
+    lines = [
+        "Survival analysis as in ISO/TS 18506: injured cases are left-censored, uninjured ones "
+        f"right-censored{f', {exact} exact' if exact else ''}; Weibull, log-normal and "
+        "log-logistic curves by greatest likelihood, the one with the smallest AIC is drawn. With "
+        "few cases the AIC hardly tells the families apart: see how far their medians lie from "
+        "each other.",
+        "The band is normal on the scale of the linear predictor. The quality index is the width "
+        "of the 95 % interval of the stimulus over the stimulus: up to 0.5 good, 1 fair, 1.5 "
+        "marginal, above unacceptable.",
+    ]
+    if analysis["influence"] is not None:
+        lines.append(
+            "Each case was left out once; one counts as carrying the curve if the stimulus at 5, "
+            f"25 or 50 % risk moves by more than {INFLUENTIAL:g} standard error."
+        )
+    return lines

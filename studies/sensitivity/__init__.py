@@ -1,0 +1,1 @@
+"""Sensitivity from the runs of any results folder."""

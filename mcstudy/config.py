@@ -203,12 +203,16 @@ def map_inputs(study: SampledStudy, model: Simulator, uniforms: Array) -> dict[s
     return columns
 
 
+def dependent_pairs(study: MonteCarloStudy | FactorStudy) -> list[tuple[str, str]]:
+    """Return the pairs of inputs that depend on each other."""
+    pairs = [(a, b) for a, b, value in study.dependence.correlations if value != 0.0]
+    return pairs + [(name, parent) for name, d in study.inputs.items() for parent in d.parents]
+
+
 def check_independent(study: FactorStudy) -> None:
     """Raise ``UserError`` if inputs of different factors depend on each other."""
     member = {name: group for group, names in study.groups.items() for name in names}
-    pairs = [(a, b) for a, b, value in study.dependence.correlations if value != 0.0]
-    pairs += [(name, parent) for name, d in study.inputs.items() for parent in d.parents]
-    for first, second in pairs:
+    for first, second in dependent_pairs(study):
         # What is not sampled at all is refused with the dependence itself.
         if first not in study.inputs or second not in study.inputs:
             continue

@@ -241,6 +241,11 @@ def digest(frame: pd.DataFrame) -> str:
     return total.hexdigest()
 
 
+def status_counts(runs: pd.DataFrame) -> dict[str, int]:
+    """Return how many runs ended with each status, the most frequent first."""
+    return {str(k): int(v) for k, v in runs["status"].value_counts().items()}
+
+
 def check_failures(counts: Mapping[str, int], failed: set[str], limit: float) -> None:
     """Raise ``StudyError`` if the share of failed runs exceeds the study's limit."""
     total = sum(counts.values())

@@ -15,6 +15,8 @@ from scipy import stats
 Array = NDArray[np.float64]
 
 CONFIDENCE = 0.95
+REACH = float(stats.norm.ppf(0.5 + CONFIDENCE / 2.0))
+"""Standard deviations of a normal interval on either side."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ def standard_deviation(values: Array, replicate: NDArray[np.int64] | None = None
         return Estimate(value, np.nan, np.nan)
     squared = (values - values.mean()) ** 2
     error = float(squared.std(ddof=1)) / (2.0 * value * np.sqrt(values.size))
-    reach = float(stats.norm.ppf(0.5 + CONFIDENCE / 2.0)) * error
+    reach = REACH * error
     return Estimate(value, value - reach, value + reach)
 
 

@@ -3,7 +3,7 @@
 import os
 import platform
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -13,11 +13,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mcstudy import config, runner
-from mcstudy.config import FactorStudy, SampledStudy, Study
+from mcstudy.config import FactorStudy, InjuryStudy, MonteCarloStudy, SampledStudy, Study
 from mcstudy.errors import UserError
 from mcstudy.failures import locate_failures
+from mcstudy.figures import style
 from mcstudy.progress import Progress
-from mcstudy.results import ResultsFolder, check_failures, digest
+from mcstudy.report import Section, render
+from mcstudy.results import ResultsFolder, check_failures, digest, status_counts
 from mcstudy.sensitivity.blocks import FEWEST_BLOCKS
 from models.protocol import Model, complete_status
 from models.registry import load_model
@@ -88,7 +90,7 @@ def run_rows(
         runs = runner.run(task, folder, Progress(quiet=quiet, complete=complete))
     # A study that was larger before keeps its further runs.
     folder.compact(held if (held := folder.done()) is not None else runs)
-    counts = {str(k): int(v) for k, v in runs["status"].value_counts().items()}
+    counts = status_counts(runs)
     manifest |= {
         "wall_time_s": round(manifest["wall_time_s"] + time.perf_counter() - start, 3),
         "counts": counts,
@@ -124,27 +126,66 @@ def whole_prefix(folder: ResultsFolder, design: Mapping[str, Any]) -> pd.DataFra
     return runs.iloc[: blocks * block]
 
 
-def judge_runs(
-    study: FactorStudy, model: Model, runs: pd.DataFrame, block: int
+def describe_runs(
+    study: MonteCarloStudy | FactorStudy | InjuryStudy,
+    model: Model,
+    runs: pd.DataFrame,
+    block: int = 1,
 ) -> tuple[dict[str, Any], NDArray[np.bool_]]:
-    """Return what an analysis in blocks begins with, and (n,) which runs are complete.
+    """Return how the runs of a study ended, and (n,) which are complete.
+
+    Parameters
+    ----------
+    study, model : of the runs. block : rows that belong together.
+    """
+    complete: NDArray[np.bool_] = runs["status"].isin(complete_status(model)).to_numpy(dtype=bool)
+    ended = {
+        "kind": study.kind,
+        "runs": len(runs),
+        "status": status_counts(runs),
+        "failures": locate_failures(runs[list(study.inputs)], ~complete, block),
+    }
+    return ended, complete
+
+
+def judge_runs(
+    study: FactorStudy | InjuryStudy, model: Model, runs: pd.DataFrame, block: int = 1
+) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+    """Return what ``describe_runs`` does, if the study allows so many failures.
 
     Raises
     ------
     StudyError
         If more runs failed than the study allows.
     """
-    complete: NDArray[np.bool_] = runs["status"].isin(complete_status(model)).to_numpy(dtype=bool)
-    counts = {str(k): int(v) for k, v in runs["status"].value_counts().items()}
+    counts = status_counts(runs)
     check_failures(counts, set(counts) - complete_status(model), study.max_failure_rate)
-    begun = {
-        "kind": study.kind,
-        "runs": len(runs),
-        "status": counts,
-        "groups": {name: list(names) for name, names in study.groups.items()},
-        "failures": locate_failures(runs[list(study.inputs)], ~complete, block),
-    }
-    return begun, complete
+    return describe_runs(study, model, runs, block)
+
+
+def publish(
+    folder: ResultsFolder,
+    title: str,
+    subtitle: str,
+    analysis: Mapping[str, Any],
+    draw: Callable[[dict[str, Any]], Mapping[str, Any]],
+    sections_of: Callable[[dict[str, Any], Mapping[str, Any]], Sequence[Section]],
+) -> dict[str, Any]:
+    """Write an analysis, its figures and its report, and return the analysis as it is on disk.
+
+    Figures and report are made of what the file holds, so that they can be made of it again.
+
+    Parameters
+    ----------
+    folder : ResultsFolder. title, subtitle : of the report.
+    draw : analysis to figures by file name. sections_of : analysis and figures to sections.
+    """
+    folder.write_json("analysis.json", analysis)
+    held = folder.read_json("analysis.json")
+    figures = draw(held)
+    style.save(figures, folder.path / "figures")
+    folder.write_text("report.html", render(title, subtitle, sections_of(held, figures)))
+    return held
 
 
 def _manifest(

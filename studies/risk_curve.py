@@ -12,11 +12,11 @@ from mcstudy.errors import UserError
 from mcstudy.figures import risk, style
 from mcstudy.injury.cases import observations_of, read_table
 from mcstudy.injury.risk_curve import INFLUENTIAL, describe_risk
-from mcstudy.report import Section, Table, render
+from mcstudy.report import Section, Table
 from mcstudy.results import ResultsFolder
 from mcstudy.schema import REFERENCE
 from mcstudy.text import interval, number, unit
-from studies.execution import load_study_model
+from studies.execution import load_study_model, publish
 from studies.injury.analysis import proportional
 from studies.injury.cells import fronts_of
 
@@ -62,25 +62,28 @@ def fit_risk_curves(
         raise UserError(f"{source}: {error}") from None
     plain = "injured" in table.columns or f"{stimulus}_low" in table.columns
     injury = "injury" if plain else f"AIS{level}+"
+    words = style.words(stimulus)
+    xlabel = words if named is None else style.label(stimulus, named)
+    subtitle = f"{found['cases']:,} cases of {source.name}, {found['injured']:,} injured"
     with folder.open_for_writing():
-        folder.write_json(
-            "analysis.json",
+        return publish(
+            folder, f"Risk of {injury} against {words}", subtitle,
             {"source": str(source), "stimulus": stimulus, "unit": named, "injury": injury} | found,
-        )
-        analysis = folder.read_json("analysis.json")
-        xlabel = style.words(stimulus) if named is None else style.label(stimulus, named)
-        figure = risk.draw_risk_curve(analysis, xlabel, f"risk of {injury}")
-        style.save({"risk_curve": figure}, folder.path / "figures")
-        subtitle = f"{analysis['cases']:,} cases of {source.name}, {analysis['injured']:,} injured"
-        section = Section(
-            "Risk curve", summarise(analysis), tables(analysis),
-            {"Risk with its 95 % band, the cases, the estimate without a family, and the stimuli "
-             "at 5, 25 and 50 % risk.": figure},
+            lambda held: {"risk_curve": risk.draw_risk_curve(held, xlabel, f"risk of {injury}")},
+            _sections_of,
         )  # fmt: skip
-        how = Section("How the curve was fitted", _method(analysis))
-        title = f"Risk of {injury} against {style.words(stimulus)}"
-        folder.write_text("report.html", render(title, subtitle, [section, how]))
-    return analysis
+
+
+def _sections_of(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list[Section]:
+    caption = (
+        "Risk with its 95 % band, the cases, the estimate without a family, and the stimuli at 5, "
+        "25 and 50 % risk."
+    )
+    shown = {caption: figures["risk_curve"]}
+    return [
+        Section("Risk curve", summarise(analysis), tables(analysis), shown),
+        Section("How the curve was fitted", _method(analysis)),
+    ]
 
 
 def _read(source: Path, stimulus: str, scenario: str | None) -> tuple[pd.DataFrame, str | None]:

@@ -1,6 +1,6 @@
 """Rankings of many inputs: elementary effects, and measures of any sample."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mcstudy.figures import style
+from mcstudy.figures.sensitivity import column
 
 Array = NDArray[np.float64]
 
@@ -41,7 +42,7 @@ def draw_mean_effects(outputs: Mapping[str, Mapping[str, Any]], dummy: str) -> F
 def draw_ranking(axes: Axes, table: Mapping[str, Mapping[str, Any]], noise: float) -> None:
     """Draw bars with intervals from the largest down, grey where not clear of noise."""
     order = sorted(table, key=lambda name: table[name]["value"])
-    values, low, high = (_column(table, order, key) for key in ("value", "low", "high"))
+    values, low, high = (column(table, order, key) for key in ("value", "low", "high"))
     places = np.arange(len(order))
     colours = [style.BLUE if table[name]["clear"] else style.GREY for name in order]
     axes.barh(
@@ -55,10 +56,6 @@ def draw_ranking(axes: Axes, table: Mapping[str, Mapping[str, Any]], noise: floa
     axes.grid(visible=False, axis="y")
 
 
-def _column(table: Mapping[str, Mapping[str, Any]], order: Sequence[str], key: str) -> Array:
-    return np.array([table[name][key] for name in order], dtype=float)
-
-
 def draw_elementary_effects(outputs: Mapping[str, Mapping[str, Any]]) -> Figure:
     """Return scatter over mean size of the elementary effects, a panel an output."""
     with style.styled():
@@ -67,7 +64,7 @@ def draw_elementary_effects(outputs: Mapping[str, Mapping[str, Any]]) -> Figure:
         for axes, (name, entry) in zip(row, outputs.items(), strict=True):
             table = {k: v for k, v in entry["factors"].items() if v["spread"] is not None}
             order = sorted(table, key=lambda key: -table[key]["value"])
-            size, spread = (_column(table, order, key) for key in ("value", "spread"))
+            size, spread = (column(table, order, key) for key in ("value", "spread"))
             top = 1.08 * float(max(size.max(), spread.max(), 1e-300))
             for slope, dash in ((0.1, ":"), (0.5, "--"), (1.0, "-")):
                 axes.plot([0.0, top], [0.0, slope * top], color=style.GREY, linestyle=dash,

@@ -41,8 +41,8 @@ def _bars(axes: Axes, entry: Mapping[str, Any], dummy: str) -> None:
     order = sorted(entry["total"], key=lambda k: entry["total"][k]["value"] or 0.0)
     places = np.arange(len(order))
     for shift, kind, colour in ((0.19, "first", style.BLUE), (-0.19, "total", style.ORANGE)):
-        values = _column(entry[kind], order, "value")
-        low, high = (_column(entry[kind], order, side) for side in ("low", "high"))
+        values = column(entry[kind], order, "value")
+        low, high = (column(entry[kind], order, side) for side in ("low", "high"))
         axes.barh(
             places + shift, values, 0.36, color=colour, label=f"{kind} index",
             xerr=np.maximum([values - low, high - values], 0.0),
@@ -57,12 +57,9 @@ def _bars(axes: Axes, entry: Mapping[str, Any], dummy: str) -> None:
     axes.grid(visible=False, axis="y")
 
 
-def _column(
-    table: Mapping[str, Mapping[str, float | None]], order: Sequence[str], key: str
-) -> Array:
-    return np.array(
-        [np.nan if table[k][key] is None else table[k][key] for k in order], dtype=float
-    )
+def column(table: Mapping[str, Mapping[str, Any]], order: Sequence[str], key: str) -> Array:
+    """Return one number of each row in the order given, NaN for null."""
+    return np.array([table[name][key] for name in order], dtype=float)
 
 
 def draw_heatmap(outputs: Mapping[str, Mapping[str, Any]]) -> Figure:

@@ -7,14 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, special, stats
 
-from mcstudy.statistics import Estimate
+from mcstudy.statistics import REACH, Estimate
 
 Array = NDArray[np.float64]
 
 RESAMPLES = 200
 STEEPEST = 50.0
 """Slope per standard deviation that no data with overlap give (assumed)."""
-_REACH = float(stats.norm.ppf(0.975))
 
 
 def rank_correlations(
@@ -42,7 +41,7 @@ def rank_correlations(
     for name, measure in (("spearman", _spearman), ("kendall", _kendall)):
         value = measure(values, levels)
         scores = _fisher(np.array([measure(values[part], levels[part]) for part in parts]))
-        centre, reach = float(_fisher(np.array(value))), _REACH * float(scores.std())
+        centre, reach = float(_fisher(np.array(value))), REACH * float(scores.std())
         low, high = np.tanh([centre - reach, centre + reach])
         found[name] = Estimate(value, float(low), float(high))
     return found
@@ -83,7 +82,7 @@ class OrdinalFit:
         if name not in self.names:
             raise ValueError(f"{name!r} is no predictor, only {', '.join(self.names)}")
         k = self.names.index(name)
-        slope, reach = self.slopes[k], _REACH * self.errors[k]
+        slope, reach = self.slopes[k], REACH * self.errors[k]
         return Estimate(*(float(np.exp(slope + s * reach)) for s in (0.0, -1.0, 1.0)))
 
 

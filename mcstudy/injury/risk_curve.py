@@ -9,12 +9,12 @@ from mcstudy.injury.observations import Observations
 from mcstudy.injury.survival import (
     FAMILIES,
     QUALITY_AT,
-    REACH,
     RiskFit,
     fit_risk_curve,
     quality_class,
 )
 from mcstudy.injury.turnbull import estimate_steps
+from mcstudy.statistics import REACH
 
 Array = NDArray[np.float64]
 

@@ -16,9 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, special, stats
+from scipy import optimize, special
 
 from mcstudy.injury.observations import Observations, check
+from mcstudy.statistics import REACH
 
 Array = NDArray[np.float64]
 
@@ -27,8 +28,6 @@ QUALITY_AT = (0.05, 0.25, 0.5)
 """Risks at which the quality index is given (ISO/TS 18506)."""
 QUALITY_CLASSES = ((0.5, "good"), (1.0, "fair"), (1.5, "marginal"), (np.inf, "unacceptable"))
 """Width of the interval over the stimulus, up to which a curve is called so (ISO/TS 18506)."""
-REACH = float(stats.norm.ppf(0.975))
-"""Standard deviations of a 95 % normal interval."""
 
 
 @dataclass(frozen=True)

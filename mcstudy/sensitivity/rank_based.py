@@ -6,7 +6,8 @@ Sort the runs by an input: what the outputs of neighbours share is what that inp
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+
+from mcstudy.statistics import REACH
 
 Array = NDArray[np.float64]
 
@@ -28,7 +29,7 @@ def rank_first_order(values: Array, outputs: Array, rng: np.random.Generator) ->
         parts = np.array_split(rng.permutation(outputs.size), PARTS)
         estimates = np.stack([_estimate(values[part], outputs[part]) for part in parts])
         variances.append(estimates.var(axis=0, ddof=1) / PARTS)
-    reach = float(stats.norm.ppf(0.975)) * np.sqrt(np.mean(variances, axis=0))
+    reach = REACH * np.sqrt(np.mean(variances, axis=0))
     return np.stack([found, found - reach, found + reach])
 
 

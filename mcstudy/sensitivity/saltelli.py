@@ -44,6 +44,16 @@ def block_size(factors: Sequence[str], *, second_order: bool) -> int:
     return (2 if second_order else 1) * len(factors) + 2
 
 
+def is_base_row(run: NDArray[np.int64], block: int) -> NDArray[np.bool_]:
+    """Tell which runs are rows of A or B: of a block only these are drawn independently.
+
+    Parameters
+    ----------
+    run : (n,) ids in the order of the design. block : rows of one base point.
+    """
+    return np.isin(run % block, (0, block - 1))
+
+
 def draw_saltelli(
     inputs: Sequence[str],
     groups: Mapping[str, Sequence[str]],

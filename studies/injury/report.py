@@ -11,7 +11,7 @@ from mcstudy.figures import risk, style
 from mcstudy.injury.functions import RiskFunction, speed_curves
 from mcstudy.report import Section, Table
 from mcstudy.schema import REFERENCE
-from mcstudy.text import interval, number, percent
+from mcstudy.text import capital, interval, number, percent
 from studies.failure_report import failure_map, failures_said, status_table
 from studies.injury.analysis import ages_of, proportional
 
@@ -154,14 +154,10 @@ def summarise(analysis: Mapping[str, Any]) -> list[str]:
         if name == REFERENCE:
             continue
         lines.append(
-            f"{_capital(entry['title'])}: {_count(entry['at_least'][level])}, "
+            f"{capital(entry['title'])}: {_count(entry['at_least'][level])}, "
             f"{_changed(entry['difference'][level])}."
         )
     return lines
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _changed(change: Mapping[str, float | None]) -> str:
@@ -248,7 +244,7 @@ def _observed_said(analysis: Mapping[str, Any]) -> list[str]:
             f"{100.0 * value:.0f} % by {analysis['functions'][name]['title']}"
             for name, value in entry["by_function"].items()
         )
-        label = _capital(entry["label"])
+        label = capital(entry["label"])
         lines.append(
             f"{label} (AIS {entry['level']}): its probability was "
             f"{percent(entry['probability'])}; over nine runs in ten it lies between "
@@ -305,7 +301,7 @@ def _limit_said(analysis: Mapping[str, Any]) -> list[str]:
     limit = analysis["limit"]
     lines = []
     for entry in analysis["scenarios"].values():
-        said = f"{_capital(entry['title'])}: " + (
+        said = f"{capital(entry['title'])}: " + (
             f"{percent(entry['above_limit'])} of the runs exceed {limit['value']:g}"
         )
         judged = next(iter(entry["limit"].values()))

@@ -13,14 +13,11 @@ from numpy.typing import NDArray
 from mcstudy import config, designs
 from mcstudy.config import InjuryStudy, load_study
 from mcstudy.errors import UserError
-from mcstudy.failures import locate_failures
-from mcstudy.figures import style
 from mcstudy.injury.functions import RiskFunction, risk_function
 from mcstudy.progress import say
-from mcstudy.report import render
-from mcstudy.results import ResultsFolder, check_failures, digest
-from models.protocol import Model, complete_status
-from studies.execution import load_study_model, run_rows
+from mcstudy.results import ResultsFolder, digest
+from models.protocol import Model
+from studies.execution import judge_runs, load_study_model, publish, run_rows
 from studies.injury.analysis import analyse, outcomes_of
 from studies.injury.cells import Cell, cells_of
 from studies.injury.report import draw, sections_of
@@ -123,43 +120,20 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
             )
         frames.append(runs.assign(scenario=cell.scenario, front=cell.front))
     runs = pd.concat(frames, ignore_index=True)
-    ended, complete = judge_injury_runs(study, model, runs)
+    ended, complete = judge_runs(study, model, runs)
     cases = outcomes_of(study, runs[complete], functions)
     folder.write_frame(CASES, cases)
-    folder.write_json("analysis.json", ended | analyse(study, model, cases, functions))
-    analysis = folder.read_json("analysis.json")
-    figures = draw(study, cases, analysis, functions)
-    style.save(figures, folder.path / "figures")
-    sections = sections_of(study, analysis, figures, functions)
+    analysis = ended | analyse(study, model, cases, functions)
     subtitle = (
         f"Injury study of {len(runs):,} runs of the {study.model.name} model, "
         f"{len(analysis['scenarios'])} scenario(s), {len(analysis['fronts'])} car front(s), "
         f"seed {study.seed}"
     )
-    folder.write_text("report.html", render(study.title, subtitle, sections))
-    return analysis
-
-
-def judge_injury_runs(
-    study: InjuryStudy, model: Model, runs: pd.DataFrame
-) -> tuple[dict[str, Any], NDArray[np.bool_]]:
-    """Return how the runs ended, and (n,) which are complete.
-
-    Raises
-    ------
-    StudyError
-        If more runs failed than the study allows.
-    """
-    complete: NDArray[np.bool_] = runs["status"].isin(complete_status(model)).to_numpy(dtype=bool)
-    counts = {str(k): int(v) for k, v in runs["status"].value_counts().items()}
-    check_failures(counts, set(counts) - complete_status(model), study.max_failure_rate)
-    ended = {
-        "kind": study.kind,
-        "runs": len(runs),
-        "status": counts,
-        "failures": locate_failures(runs[list(study.inputs)], ~complete),
-    }
-    return ended, complete
+    return publish(
+        folder, study.title, subtitle, analysis,
+        lambda held: draw(study, cases, held, functions),
+        lambda held, figures: sections_of(study, held, figures, functions),
+    )  # fmt: skip
 
 
 def check_functions(study: InjuryStudy, model: Model) -> dict[str, RiskFunction]:

@@ -10,7 +10,7 @@ from mcstudy import units
 from mcstudy.config import MonteCarloStudy
 from mcstudy.figures import style
 from mcstudy.report import Section, Table
-from mcstudy.text import interval, number, percent, quantity, unit
+from mcstudy.text import capital, interval, number, percent, quantity, unit
 from models.protocol import Model
 from studies.failure_report import failures_said, status_table
 
@@ -68,8 +68,7 @@ def summarise(analysis: Mapping[str, Any]) -> list[Table]:
 
 
 def _title(name: str) -> str:
-    words = style.words(name)
-    return words[0].upper() + words[1:]
+    return capital(style.words(name))
 
 
 def _summary(study: MonteCarloStudy, model: Model, analysis: Mapping[str, Any]) -> list[str]:

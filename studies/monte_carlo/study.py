@@ -9,12 +9,10 @@ import pandas as pd
 from mcstudy import config, statistics, units
 from mcstudy.config import MonteCarloStudy, load_study
 from mcstudy.errors import UserError
-from mcstudy.failures import locate_failures
-from mcstudy.figures import distributions, relations, style
-from mcstudy.report import render
+from mcstudy.figures import distributions, relations
 from mcstudy.results import ResultsFolder
 from models.protocol import Model, complete_status
-from studies.execution import load_study_model, run_rows
+from studies.execution import describe_runs, load_study_model, publish, run_rows
 from studies.failure_report import failure_map
 from studies.monte_carlo.report import sections_of
 
@@ -83,18 +81,15 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
     model = load_study_model(study)
     runs = folder.runs()
     runs = runs[runs["run"] < study.design.n]
-    analysis = analyse(study, model, runs)
-    folder.write_json("analysis.json", analysis)
-    analysis = folder.read_json("analysis.json")
-    figures = draw(study, model, runs, analysis)
-    style.save(figures, folder.path / "figures")
-    sections = sections_of(study, model, runs, analysis, figures)
     subtitle = (
         f"Monte Carlo study of {len(runs):,} runs of the {model.name} model, "
         f"{study.design.method} design, seed {study.seed}"
     )
-    folder.write_text("report.html", render(study.title, subtitle, sections))
-    return analysis
+    return publish(
+        folder, study.title, subtitle, analyse(study, model, runs),
+        lambda held: draw(study, model, runs, held),
+        lambda held, figures: sections_of(study, model, runs, held, figures),
+    )  # fmt: skip
 
 
 def marks_of(study: MonteCarloStudy, model: Model) -> dict[str, list[distributions.Mark]]:
@@ -122,17 +117,13 @@ def marks_of(study: MonteCarloStudy, model: Model) -> dict[str, list[distributio
 
 def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[str, Any]:
     """Return every number that the report prints."""
-    ended = runs["status"].isin(complete_status(model)).to_numpy(dtype=bool)
-    complete = runs[ended]
+    ended, held = describe_runs(study, model, runs)
+    complete = runs[held]
     groups = None if study.design.method == "monte-carlo" else complete["replicate"].to_numpy()
     marks = marks_of(study, model)
     sampled = list(study.inputs)
     wanted = config.report_outputs(study, model)
-    analysis: dict[str, Any] = {
-        "kind": study.kind,
-        "runs": len(runs),
-        "status": {str(k): int(v) for k, v in runs["status"].value_counts().items()},
-        "failures": locate_failures(runs[sampled], ~ended),
+    analysis: dict[str, Any] = ended | {
         "outputs": {},
         "exceedance": {},
         "observed": {},

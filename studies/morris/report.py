@@ -8,7 +8,7 @@ from mcstudy.figures import screening, style
 from mcstudy.report import Section, Table
 from mcstudy.sensitivity.factors import DUMMY, NUDGE
 from mcstudy.sensitivity.morris import TAIL
-from mcstudy.text import interval, number, unit
+from mcstudy.text import capital, interval, number, unit
 from models.protocol import Model
 from studies.factor_report import groups_said
 from studies.failure_report import failure_map, failures_said, status_table
@@ -84,13 +84,13 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     suffix = f" {unit(entry['unit'])}".rstrip()
     title = style.words(name)
     if not clear:
-        return f"{title[0].upper() + title[1:]}: no factor stands out of the noise."
+        return f"{capital(title)}: no factor stands out of the noise."
     named = ", ".join(
         f"{style.words(f)} ({number(factors[f]['value'])} ± "
         f"{number(factors[f]['value'] - factors[f]['low'], 2)}{suffix})"
         for f in clear[:NAMED]
     )
-    lines = [f"{title[0].upper() + title[1:]} is moved most by {named}."]
+    lines = [f"{capital(title)} is moved most by {named}."]
     curved = [
         f for f in clear[:NAMED] if (factors[f]["spread"] or 0.0) > CURVED * factors[f]["value"]
     ]

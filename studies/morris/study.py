@@ -7,13 +7,12 @@ import pandas as pd
 from mcstudy import config
 from mcstudy.config import MorrisStudy, load_study
 from mcstudy.errors import StudyError, UserError
-from mcstudy.figures import style
-from mcstudy.report import render
 from mcstudy.results import ResultsFolder
 from mcstudy.sensitivity.blocks import is_enough, whole_blocks
 from mcstudy.sensitivity.morris import ElementaryEffects, draw_trajectories, estimate_effects
+from mcstudy.statistics import Estimate
 from models.protocol import Model
-from studies.execution import judge_runs, load_study_model, run_rows, whole_prefix
+from studies.execution import judge_runs, load_study_model, publish, run_rows, whole_prefix
 from studies.morris.report import draw, sections_of
 
 
@@ -79,18 +78,15 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
     model = load_study_model(study)
     manifest = folder.read_json("manifest.json")
     runs = whole_prefix(folder, manifest["design"])
-    folder.write_json("analysis.json", analyse(study, model, runs))
-    analysis = folder.read_json("analysis.json")
-    figures = draw(analysis)
-    style.save(figures, folder.path / "figures")
+    analysis = analyse(study, model, runs)
     subtitle = (
         f"Morris screening by {len(runs):,} runs of the {model.name} model: "
         f"{analysis['trajectories']:,} trajectories, seed {study.seed}"
     )
-    folder.write_text(
-        "report.html", render(study.title, subtitle, sections_of(study, model, analysis, figures))
-    )
-    return analysis
+    return publish(
+        folder, study.title, subtitle, analysis, draw,
+        lambda held, figures: sections_of(study, model, held, figures),
+    )  # fmt: skip
 
 
 def analyse(study: MorrisStudy, model: Model, runs: pd.DataFrame) -> dict[str, Any]:
@@ -107,7 +103,12 @@ def analyse(study: MorrisStudy, model: Model, runs: pd.DataFrame) -> dict[str, A
     names = [item.name for item in model.outputs]
     cube, kept = whole_blocks(runs[names].to_numpy(dtype=float), complete, drawn.block)
     levels = drawn.levels[: len(runs)].reshape(len(cube), drawn.block, -1)
-    analysis |= {"trajectories": len(cube), "factors": list(drawn.factors), "outputs": {}}
+    analysis |= {
+        "groups": {name: list(members) for name, members in study.groups.items()},
+        "trajectories": len(cube),
+        "factors": list(drawn.factors),
+        "outputs": {},
+    }
     for column, item in enumerate(model.outputs):
         held = kept[:, column]
         entry: dict[str, Any] = {"unit": item.unit, "trajectories": int(held.sum())}
@@ -134,9 +135,7 @@ def _by_factor(found: ElementaryEffects, factors: tuple[str, ...]) -> dict[str, 
     return {
         name: {
             "mean": float(mean),
-            "value": float(size[0]),
-            "low": float(size[1]),
-            "high": float(size[2]),
+            **Estimate(*size.tolist()).as_dict(),
             "spread": float(spread),
             # The last factor is the dummy.
             "clear": bool(size[1] > found.mean_size[2, -1]),

@@ -1,6 +1,6 @@
 """Sensitivity from the runs of any results folder, whatever the study's design was."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,13 +9,13 @@ import pandas as pd
 from mcstudy import config
 from mcstudy.config import MonteCarloStudy, MorrisStudy, SobolStudy, load_study
 from mcstudy.errors import UserError
-from mcstudy.figures import style
 from mcstudy.progress import follow
-from mcstudy.report import render
 from mcstudy.results import ResultsFolder
 from mcstudy.sensitivity.given_data import measure_given_data
+from mcstudy.sensitivity.saltelli import is_base_row
+from mcstudy.statistics import Estimate
 from models.protocol import complete_status
-from studies.execution import load_study_model
+from studies.execution import load_study_model, publish
 from studies.main_effects import main_effects_of
 from studies.sensitivity.report import draw, sections_of
 
@@ -73,7 +73,7 @@ def measure_sensitivity(
         "kind": study.kind,
         "title": study.title,
         "runs": len(complete),
-        "dependent": _dependent(study),
+        "dependent": sorted({name for pair in config.dependent_pairs(study) for name in pair}),
         "outputs": {},
         "main_effects": {},
     }
@@ -89,12 +89,8 @@ def measure_sensitivity(
             measure: {
                 "noise": found.noise[measure],
                 "inputs": {
-                    key: {
-                        "value": float(table[0, k]),
-                        "low": float(table[1, k]),
-                        "high": float(table[2, k]),
-                        "clear": bool(table[0, k] > found.noise[measure]),
-                    }
+                    key: Estimate(*table[:, k].tolist()).as_dict()
+                    | {"clear": bool(table[0, k] > found.noise[measure])}
                     for k, key in enumerate(inputs)
                 },
             }
@@ -105,15 +101,8 @@ def measure_sensitivity(
         }  # fmt: skip
         analysis["main_effects"][name] = main_effects_of(study, model, complete, name)
     with folder.open_for_writing():
-        folder.write_json("analysis.json", analysis)
-        analysis = folder.read_json("analysis.json")
-        figures = draw(analysis)
-        style.save(figures, folder.path / "figures")
         subtitle = f"Sensitivity from {len(complete):,} runs of the {study.kind} study {study.name}"
-        folder.write_text(
-            "report.html", render(study.title, subtitle, sections_of(analysis, figures))
-        )
-    return analysis
+        return publish(folder, study.title, subtitle, analysis, draw, sections_of)
 
 
 def _independent(source: ResultsFolder, runs: pd.DataFrame) -> pd.DataFrame:
@@ -122,13 +111,4 @@ def _independent(source: ResultsFolder, runs: pd.DataFrame) -> pd.DataFrame:
     block = int(design.get("block", 1))
     if block == 1:
         return runs
-    place = runs["run"] % block
-    return runs[(place == 0) | (place == block - 1)]
-
-
-def _dependent(study: MonteCarloStudy | SobolStudy) -> list[str]:
-    """Return the inputs that depend on others."""
-    pairs: Iterable[tuple[str, str]] = [(a, b) for a, b, _ in study.dependence.correlations] + [
-        (name, parent) for name, entry in study.inputs.items() for parent in entry.parents
-    ]
-    return sorted({name for pair in pairs for name in pair})
+    return runs[is_base_row(runs["run"].to_numpy(), block)]

@@ -6,7 +6,7 @@ from typing import Any
 from mcstudy.figures import screening, sensitivity, style
 from mcstudy.report import Section, Table
 from mcstudy.sensitivity.given_data import DUMMIES
-from mcstudy.text import number, share
+from mcstudy.text import capital, number, share
 
 TITLES = {
     "first_order": "first-order index, rank based [–]",
@@ -36,7 +36,7 @@ def sections_of(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list
     sections = []
     for name, entry in analysis["outputs"].items():
         words = style.words(name)
-        heading, said = words[0].upper() + words[1:], [sentence(name, entry)]
+        heading, said = capital(words), [sentence(name, entry)]
         if not _varies(entry):
             sections.append(Section(heading, said))
             continue
@@ -59,7 +59,7 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     """Say in words which inputs go with an output."""
     words = style.words(name)
     if not _varies(entry):
-        return f"{words[0].upper() + words[1:]} does not vary."
+        return f"{capital(words)} does not vary."
     first = entry["measures"]["first_order"]["inputs"]
     order = sorted(first, key=lambda key: -first[key]["value"])
     clear = [key for key in order if first[key]["clear"]]

@@ -1,6 +1,7 @@
 """Every number of a Sobol' report, from the table of runs."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,9 @@ from mcstudy.config import SobolStudy
 from mcstudy.errors import StudyError
 from mcstudy.sensitivity.blocks import FEWEST_BLOCKS, is_enough, outputs_alike, whole_blocks
 from mcstudy.sensitivity.factors import DUMMY, factors_of
-from mcstudy.sensitivity.saltelli import block_size
+from mcstudy.sensitivity.saltelli import block_size, is_base_row
 from mcstudy.sensitivity.sobol import Indices, estimate_indices, split_blocks
+from mcstudy.statistics import Estimate
 from models.protocol import Model
 from studies.execution import judge_runs
 from studies.main_effects import main_effects_of
@@ -25,6 +27,51 @@ STEPS = 6
 STEP_RESAMPLES = 200
 
 
+@dataclass(frozen=True)
+class _Ranked:
+    """Outputs with their indices, and the blocks that these come from.
+
+    Attributes
+    ----------
+    begun : what the analysis begins with. complete : (n,) runs that did not fail.
+    cube : (base points, block, outputs). kept : (base points, outputs). scramble : of each point.
+    factors : names. outputs : entries by name. wanted : reported outputs that have an index.
+    """
+
+    begun: dict[str, Any]
+    complete: NDArray[np.bool_]
+    cube: Array
+    kept: NDArray[np.bool_]
+    scramble: NDArray[np.int64]
+    factors: tuple[str, ...]
+    outputs: dict[str, dict[str, Any]]
+    wanted: list[str]
+
+    @property
+    def widest(self) -> float:
+        """Widest interval of a total index of the reported outputs."""
+        widths = [
+            entry["high"] - entry["low"]
+            for name in self.wanted
+            if self.outputs[name]["variance"]
+            for factor, entry in self.outputs[name]["total"].items()
+            if factor != DUMMY
+        ]
+        # An interval that could not be estimated is not a narrow one.
+        return float(np.max(np.nan_to_num(widths, nan=np.inf), initial=0.0))
+
+
+def widest_interval(study: SobolStudy, model: Model, runs: pd.DataFrame) -> float:
+    """Return the widest interval of a total index of the reported outputs.
+
+    Raises
+    ------
+    StudyError
+        As ``analyse``.
+    """
+    return _rank(study, model, runs).widest
+
+
 def analyse(study: SobolStudy, model: Model, runs: pd.DataFrame) -> dict[str, Any]:
     """Return every number that the report prints.
 
@@ -33,20 +80,38 @@ def analyse(study: SobolStudy, model: Model, runs: pd.DataFrame) -> dict[str, An
     StudyError
         If more runs failed than the study allows, or no reported output can be given an index.
     """
+    ranked = _rank(study, model, runs)
+    names = [item.name for item in model.outputs]
+    drawn = runs[ranked.complete & is_base_row(runs["run"].to_numpy(), ranked.cube.shape[1])]
+    convergence, main_effects = {}, {}
+    for name in ranked.wanted:
+        column = names.index(name)
+        held = ranked.kept[:, column]
+        convergence[name] = _convergence(
+            study, ranked.cube[held][:, :, [column]], ranked.scramble[held], ranked.factors
+        )
+        main_effects[name] = main_effects_of(study, model, drawn, name)
+    return ranked.begun | {
+        "groups": {name: list(members) for name, members in study.groups.items()},
+        "base_points": len(ranked.cube),
+        "factors": list(ranked.factors),
+        "outputs": ranked.outputs,
+        "convergence": convergence,
+        "main_effects": main_effects,
+        "widest": ranked.widest,
+        "tolerance": study.design.tolerance,
+    }
+
+
+def _rank(study: SobolStudy, model: Model, runs: pd.DataFrame) -> _Ranked:
+    """Return the indices of all outputs that can be given any."""
     factors = factors_of(list(study.inputs), study.groups)
     block = block_size(factors, second_order=study.design.second_order)
-    analysis, complete = judge_runs(study, model, runs, block)
-    wanted = config.report_outputs(study, model)
+    begun, complete = judge_runs(study, model, runs, block)
     names = [item.name for item in model.outputs]
     cube, kept = whole_blocks(runs[names].to_numpy(dtype=float), complete, block)
     scramble = runs["replicate"].to_numpy()[::block]
-    analysis |= {
-        "base_points": len(cube),
-        "factors": list(factors),
-        "outputs": {},
-        "convergence": {},
-        "main_effects": {},
-    }
+    outputs: dict[str, dict[str, Any]] = {}
     for pattern, same in outputs_alike(kept):
         entries: list[dict[str, Any]] = [{}] * same.size
         if is_enough(pattern):
@@ -54,33 +119,15 @@ def analyse(study: SobolStudy, model: Model, runs: pd.DataFrame) -> dict[str, An
             entries = [_entry(found, k, factors) for k in range(same.size)]
         for column, entry in zip(same.tolist(), entries, strict=True):
             item = model.outputs[column]
-            counts = {"unit": item.unit, "base_points": int(pattern.sum())}
-            analysis["outputs"][item.name] = counts | entry
-    ranked = [name for name in wanted if "total" in analysis["outputs"][name]]
-    if not ranked:
+            outputs[item.name] = {"unit": item.unit, "base_points": int(pattern.sum())} | entry
+    reported = config.report_outputs(study, model)
+    wanted = [name for name in reported if "total" in outputs[name]]
+    if not wanted:
         raise StudyError(
-            f"{', '.join(wanted)}: too few of the {len(cube)} base points have no failed run and a "
-            "value in every row; no index is given"
+            f"{', '.join(reported)}: too few of the {len(cube)} base points have no failed run and "
+            "a value in every row; no index is given"
         )
-    # Of a block only A and B are drawn independently.
-    drawn = runs[complete & np.isin(runs["run"] % block, (0, block - 1))]
-    for name in ranked:
-        column = names.index(name)
-        held = kept[:, column]
-        analysis["convergence"][name] = _convergence(
-            study, cube[held][:, :, column : column + 1], scramble[held], factors
-        )
-        analysis["main_effects"][name] = main_effects_of(study, model, drawn, name)
-    widths = [
-        entry["high"] - entry["low"]
-        for name in ranked
-        if analysis["outputs"][name]["variance"]
-        for factor, entry in analysis["outputs"][name]["total"].items()
-        if factor != DUMMY
-    ]
-    # An interval that could not be estimated is not a narrow one.
-    widest = float(np.max(np.nan_to_num(widths, nan=np.inf), initial=0.0))
-    return analysis | {"widest": widest, "tolerance": study.design.tolerance}
+    return _Ranked(begun, complete, cube, kept, scramble, factors, outputs, wanted)
 
 
 def _indices(
@@ -115,7 +162,7 @@ def _entry(found: Indices, k: int, factors: Sequence[str]) -> dict[str, Any]:
 
 
 def _estimate(triple: Array) -> dict[str, float]:
-    return dict(zip(("value", "low", "high"), triple.tolist(), strict=True))
+    return Estimate(*triple.tolist()).as_dict()
 
 
 def _convergence(

@@ -8,7 +8,7 @@ from mcstudy.figures import sensitivity, style
 from mcstudy.report import Section, Table
 from mcstudy.sensitivity.factors import DUMMY, NUDGE
 from mcstudy.sensitivity.saltelli import SCRAMBLES
-from mcstudy.text import quantity, share
+from mcstudy.text import capital, quantity, share
 from models.protocol import Model
 from studies.factor_report import groups_said
 from studies.failure_report import failure_map, failures_said, status_table
@@ -121,7 +121,7 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     """Say in words what drives an output."""
     title = style.words(name)
     if not entry["variance"]:
-        return f"{title[0].upper() + title[1:]} does not vary."
+        return f"{capital(title)} does not vary."
     first, total = entry["first"], entry["total"]
     noise = total[DUMMY]
     factors = [factor for factor in total if factor != DUMMY]
@@ -173,7 +173,7 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
         f"{NUDGE:g} of their range makes {title} scatter by {_quantity(entry['noise_sd'], entry)} "
         "(standard deviation)."
     )
-    return " ".join(line[0].upper() + line[1:] for line in lines)
+    return " ".join(capital(line) for line in lines)
 
 
 def _share(entry: Mapping[str, float]) -> str:

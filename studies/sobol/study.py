@@ -5,13 +5,11 @@ from typing import Any
 from mcstudy import config
 from mcstudy.config import SobolStudy, load_study
 from mcstudy.errors import UserError
-from mcstudy.figures import style
 from mcstudy.progress import say
-from mcstudy.report import render
 from mcstudy.results import ResultsFolder
 from mcstudy.sensitivity.saltelli import draw_saltelli
-from studies.execution import load_study_model, run_rows, whole_prefix
-from studies.sobol.analysis import analyse
+from studies.execution import load_study_model, publish, run_rows, whole_prefix
+from studies.sobol.analysis import analyse, widest_interval
 from studies.sobol.report import draw, sections_of
 
 
@@ -68,7 +66,7 @@ def run_sobol(
             )  # fmt: skip
             if design.tolerance is None or n >= design.n:
                 break
-            width = analyse(study, model, runs)["widest"]
+            width = widest_interval(study, model, runs)
             say(f"{n} base points: widest interval of a total index {width:.3f}", quiet=quiet)
             if width <= design.tolerance:
                 break
@@ -92,14 +90,12 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
     model = load_study_model(study)
     manifest = folder.read_json("manifest.json")
     runs = whole_prefix(folder, manifest["design"])
-    folder.write_json("analysis.json", analyse(study, model, runs))
-    analysis = folder.read_json("analysis.json")
-    figures = draw(analysis)
-    style.save(figures, folder.path / "figures")
+    analysis = analyse(study, model, runs)
     subtitle = (
         f"Sobol' study of {len(runs):,} runs of the {model.name} model: "
         f"{analysis['base_points']:,} base points, seed {study.seed}"
     )
-    sections = sections_of(study, model, analysis, figures)
-    folder.write_text("report.html", render(study.title, subtitle, sections))
-    return analysis
+    return publish(
+        folder, study.title, subtitle, analysis, draw,
+        lambda held, figures: sections_of(study, model, held, figures),
+    )  # fmt: skip

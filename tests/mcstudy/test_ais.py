@@ -157,7 +157,7 @@ def test_combine_takes_the_larger_or_the_complement_of_the_product() -> None:
 @pytest.mark.parametrize("together", ["dependent", "independent"])
 def test_one_mechanism_alone_is_itself(together: str) -> None:
     a = falling(3)
-    np.testing.assert_allclose(combine([a], together), a, rtol=1e-12)  # type: ignore[arg-type]
+    np.testing.assert_allclose(combine([a], together), a, rtol=1e-12)
 
 
 @QUIET
@@ -177,8 +177,8 @@ def test_the_order_of_mechanisms_does_not_count() -> None:
     a, b, c = falling(1), falling(2), falling(3)
     for together in ("dependent", "independent"):
         np.testing.assert_allclose(
-            combine([a, b, c], together),  # type: ignore[arg-type]
-            combine([c, a, b], together),  # type: ignore[arg-type]
+            combine([a, b, c], together),
+            combine([c, a, b], together),
             rtol=1e-12,
         )
 
@@ -205,7 +205,7 @@ def test_a_distribution_sums_to_one_and_is_not_negative(
     }
     parts = [mix(mechanism, outputs, np.array([age])) for mechanism in (BLOW, TURN)]
     for together in ("dependent", "independent"):
-        shares = distribution(combine(parts, together))  # type: ignore[arg-type]
+        shares = distribution(combine(parts, together))
         assert shares.shape == (1, 7)
         assert np.all(shares >= -1e-15)
         assert float(shares.sum()) == pytest.approx(1.0, abs=1e-12)

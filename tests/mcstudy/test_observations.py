@@ -53,7 +53,7 @@ def test_without_leaves_out_one_case() -> None:
 
 
 def test_flags_may_be_zeros_and_ones() -> None:
-    a, b = observe(X, HURT), observe(list(X), [0, 1, 0, 1])  # type: ignore[arg-type]
+    a, b = observe(X, HURT), observe(list(X), [0, 1, 0, 1])
     np.testing.assert_array_equal(a.low, b.low)
     np.testing.assert_array_equal(a.high, b.high)
 

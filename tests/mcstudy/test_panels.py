@@ -20,7 +20,7 @@ def panel(title: str = "", **changes: object) -> Panel:
         "bands": [],
         "title": title,
     }
-    return Panel(**(plain | changes))  # type: ignore[arg-type]
+    return Panel(**(plain | changes))
 
 
 def legend_words(figure: Figure, k: int = 0) -> list[str]:

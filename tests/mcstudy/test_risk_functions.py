@@ -236,7 +236,7 @@ def test_monfort_and_mueller_is_their_formula_for_a_boy_and_a_low_bonnet() -> No
 @pytest.mark.parametrize("curve", speed_curves(), ids=lambda c: c.name)
 def test_speed_curves_rise_within_their_range(curve: object) -> None:
     speed = np.linspace(0.0, 140.0, 400)
-    found = curve.risk(speed)  # type: ignore[attr-defined]
+    found = curve.risk(speed)
     held = found[np.isfinite(found)]
     assert held.size > 100
     assert np.all(np.diff(held) > 0.0)

@@ -77,7 +77,7 @@ def integrate(values: Mapping[str, float]) -> Reference:
     def turning(_: float, state: Array) -> float:
         return float(state[1])
 
-    turning.terminal, turning.direction = True, -1.0  # type: ignore[attr-defined]
+    turning.terminal, turning.direction = True, -1.0
     start = [0.0, speed * math.cos(angle), speed * math.sin(angle), 0.0]
     accuracy = {"rtol": 1e-9, "atol": 1e-11, "max_step": 2e-4}
     down = solve_ivp(
@@ -90,7 +90,7 @@ def integrate(values: Mapping[str, float]) -> Reference:
     def unloading(_: float, state: Array) -> float:
         return top * (1.0 - ratio * (deepest - state[0]) / deepest)
 
-    unloading.terminal = True  # type: ignore[attr-defined]
+    unloading.terminal = True
     up = solve_ivp(
         lambda t, y: motion(max(unloading(t, y), 0.0), y),
         (down.t[-1], 3.0), down.y[:, -1], events=unloading, **accuracy,

@@ -392,7 +392,7 @@ def test_inputs_of_the_cells_are_those_of_a_monte_carlo_study(full: ResultsFolde
                  "")
     )  # fmt: skip
     study = parse_study(text)
-    columns = config.sample_inputs(study, load_study_model(study))  # type: ignore[arg-type]
+    columns = config.sample_inputs(study, load_study_model(study))
     runs = cell(full, "reference.sedan").runs()
     for name in ("impact_speed", "headform_mass", "hood_force_scale"):
         assert runs[name].to_numpy().tobytes() == columns[name].tobytes()

@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -58,20 +57,6 @@ def failing(tmp_path_factory: pytest.TempPathFactory) -> ResultsFolder:
     results = copy_of(whole, base / "failing", runs)
     api.build_report(results)
     return results
-
-
-@pytest.fixture
-def undrawn() -> Iterator[None]:
-    """Leave the figures out."""
-    with without_figures():
-        yield
-
-
-@pytest.fixture
-def fast(undrawn: None) -> Iterator[None]:
-    """Leave the figures blank and run by formula."""
-    with by_formula():
-        yield
 
 
 def effects_of(runs: pd.DataFrame, output: str) -> dict[str, list[float]]:

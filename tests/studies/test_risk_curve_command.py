@@ -358,7 +358,7 @@ def refused(tmp_path: Path, source: Path, *options: str, stimulus: str = "hic") 
 def with_first(column: str, value: object) -> pd.DataFrame:
     """Return good cases of which the third has another value."""
     table = GOOD.astype({column: object})
-    table.loc[2, column] = value  # type: ignore[call-overload]
+    table.loc[2, column] = value
     return table
 
 

@@ -3,7 +3,6 @@
 import itertools
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -79,20 +78,6 @@ def failing(tmp_path_factory: pytest.TempPathFactory) -> ResultsFolder:
         patch.setattr(sobol, "draw", failure_map)
         run_text(plain(inputs=FAILING, force=100.0, limit=0.5, outputs=("hic15",)), results)
     return results
-
-
-@pytest.fixture
-def undrawn() -> Iterator[None]:
-    """Leave the figures out."""
-    with without_figures():
-        yield
-
-
-@pytest.fixture
-def fast(undrawn: None) -> Iterator[None]:
-    """Leave the figures out and run by formula."""
-    with by_formula():
-        yield
 
 
 # -- the numbers ------------------------------------------------------------------------------

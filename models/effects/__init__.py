@@ -1,0 +1,1 @@
+"""Named physical effects that extend a model; off unless they are switched on."""

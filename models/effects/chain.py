@@ -1,0 +1,74 @@
+"""The effects that a model has switched on, in the order of the catalogue."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+from models.effects.effect import Effect
+from models.effects.registry import EFFECTS, load_effect
+from models.protocol import Input
+
+Subject = TypeVar("Subject")
+
+
+@dataclass(frozen=True)
+class EffectChain:
+    """Effects in order, and the inputs that they add to a model.
+
+    Attributes
+    ----------
+    effects : switched on. inputs : their parameters, nominal at the values given.
+    """
+
+    effects: tuple[Effect, ...] = ()
+    inputs: tuple[Input, ...] = ()
+
+    def act(self, stage: str, subject: Subject, values: Mapping[str, float]) -> Subject:
+        """Return what a stage hands over, changed by its effects one after the other."""
+        for effect in self.effects:
+            if effect.stage == stage:
+                own = {name: values[effect.input_name(name)] for name in effect.parameters}
+                subject = effect.apply(subject, own)
+        return subject
+
+
+def build_chain(model: str, chosen: Mapping[str, Mapping[str, float]] | None) -> EffectChain:
+    """Return the chain of the effects that are switched on.
+
+    Parameters
+    ----------
+    model : name of the model.
+    chosen : by effect the values of its parameters; those left out take the prior's median.
+
+    Raises
+    ------
+    ValueError
+        If an effect or a parameter is unknown, does not apply to the model or is out of range.
+    """
+    chosen = chosen or {}
+    for name in chosen:
+        if name not in EFFECTS:
+            raise ValueError(f"no effect {name!r}; there are {', '.join(EFFECTS)}")
+    effects = tuple(load_effect(name) for name in EFFECTS if name in chosen)
+    inputs = []
+    for effect in effects:
+        if model not in effect.models:
+            raise ValueError(
+                f"effect {effect.name!r} does not apply to model {model!r}, only to "
+                f"{', '.join(effect.models)}"
+            )
+        given = chosen[effect.name]
+        for name in given:
+            if name not in effect.parameters:
+                known = ", ".join(effect.parameters)
+                raise ValueError(f"effect {effect.name!r} has no parameter {name!r}, only {known}")
+        for name, parameter in effect.parameters.items():
+            item = parameter.input
+            nominal = float(given.get(name, parameter.prior.quantile(0.5)))
+            if not item.low <= nominal <= item.high:
+                raise ValueError(
+                    f"effects.{effect.name}.{name}: {nominal:g} {item.unit} is outside "
+                    f"{item.low:g} to {item.high:g} {item.unit}"
+                )
+            inputs.append(replace(item, name=effect.input_name(name), nominal=nominal))
+    return EffectChain(effects, tuple(inputs))

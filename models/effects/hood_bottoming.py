@@ -1,0 +1,30 @@
+"""The hood meets a structure below it after a clearance.
+
+Beyond the clearance the force grows by ``stiffness * depth * (depth / 10 mm)^(power - 1)``, in straight
+pieces.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from models.contact.law import ForceCurve
+
+
+REFERENCE = 0.010
+"""Depth (m) beyond the clearance at which all powers have the same force."""
+DEPTHS = (0.0025, 0.005, 0.01, 0.02, 0.04)
+"""Depths (m) beyond the clearance at which a curved law is cut into straight pieces."""
+
+
+def apply(curve: ForceCurve, parameters: Mapping[str, float]) -> ForceCurve:
+    """Return the hood's loading curve with the effect."""
+    clearance, power = parameters["clearance"], parameters["power"]
+    if parameters["stiffness"] == 0.0:
+        return curve
+    depths = np.array([0.0, *(DEPTHS if power > 1.0 else DEPTHS[-1:])])
+    x = np.union1d(curve.penetration, clearance + depths)
+    depth = np.maximum(x - clearance, 0.0)
+    added = parameters["stiffness"] * depth * (depth / REFERENCE) ** (power - 1.0)
+    return replace(curve, penetration=x, force=curve.at(x) + added)

@@ -1,0 +1,22 @@
+"""The hood yields beyond a force: the slope that remains is a share of the curve's."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from models.contact.law import ForceCurve
+
+
+def apply(curve: ForceCurve, parameters: Mapping[str, float]) -> ForceCurve:
+    """Return the hood's loading curve with the effect."""
+    force, remaining = parameters["force"], parameters["remaining"]
+    d, f = curve.penetration, curve.force
+    last = (f[-1] - f[-2]) / (d[-1] - d[-2])
+    begin = float(np.interp(force, f, d)) if force <= f[-1] else d[-1] + (force - f[-1]) / last
+    x = np.union1d(d, [begin])
+    if begin >= x[-1]:
+        # The last slope goes on beyond the last knot: one more there tells it what is left.
+        x = np.append(x, begin + d[-1])
+    at = curve.at(x)
+    return replace(curve, penetration=x, force=np.minimum(at, force + remaining * (at - force)))

@@ -1,0 +1,72 @@
+"""The catalogue: a new effect is one file, one table of data and one line here."""
+
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+from models import data
+from models.effects.effect import STAGES, Effect, Parameter, Prior
+from models.protocol import Input
+
+EFFECTS: tuple[str, ...] = (
+    # What was set up otherwise than recorded.
+    "speed_bias",
+    "mass_error",
+    "hood_force_scale",
+    # The hood and the head's contact with it.
+    "hood_bottoming",
+    "hood_yield",
+    "unloading_slope",
+    "rate_dependent_hood",
+    "skin_compliance",
+    # The accelerometer, in the order in which a signal passes through it.
+    "sensor_gain",
+    "sensor_offset",
+    "sensor_saturation",
+    "sensor_filter",
+    "time_scale",
+)
+"""Effects in the order in which they act within a stage."""
+
+
+@cache
+def load_effect(name: str) -> Effect:
+    """Return an effect of the catalogue.
+
+    Raises
+    ------
+    ValueError
+        If there is none of that name.
+    """
+    if name not in EFFECTS:
+        raise ValueError(f"no effect {name!r}; there are {', '.join(EFFECTS)}")
+    row = data.load("effects.toml")["effects"][name]
+    if row["stage"] not in STAGES:
+        raise ValueError(f"effect {name!r}: unknown stage {row['stage']!r}")
+    return Effect(
+        name=name,
+        title=row["title"],
+        stage=row["stage"],
+        models=tuple(row["models"]),
+        parameters={key: _parameter(key, entry) for key, entry in row["parameters"].items()},
+        signature=row["signature"],
+        confusable=tuple(row["confusable"]),
+        separated_by=row["separated_by"],
+        source=row["source"],
+        apply=import_module(f"models.effects.{name}").apply,
+    )
+
+
+def _parameter(name: str, row: dict[str, Any]) -> Parameter:
+    prior = Prior(row["prior"][0], float(row["prior"][1]), float(row["prior"][2]))
+    low, high = (float(v) for v in row["range"])
+    item = Input(
+        name=name,
+        unit=row["unit"],
+        meaning=row["meaning"],
+        nominal=float(prior.quantile(0.5)),
+        low=low,
+        high=high,
+        source="prior of the effect",
+    )
+    return Parameter(item, prior, float(row["none"]))

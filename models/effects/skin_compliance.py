@@ -1,0 +1,11 @@
+"""The headform's skin gives way in series with the hood, and springs back fully."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from models.headform.reading import HeadformContact
+
+
+def apply(contact: HeadformContact, parameters: Mapping[str, float]) -> HeadformContact:
+    """Return the contact with the effect."""
+    return replace(contact, skin_compliance=contact.skin_compliance + parameters["compliance"])

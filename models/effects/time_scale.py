@@ -1,0 +1,11 @@
+"""The clock of the recorder runs fast or slow."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from models.headform.reading import Reading
+
+
+def apply(reading: Reading, parameters: Mapping[str, float]) -> Reading:
+    """Return what the accelerometer reads with the effect."""
+    return replace(reading, clock=reading.clock * parameters["factor"])

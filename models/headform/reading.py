@@ -1,0 +1,41 @@
+"""What effects may change of a headform test: its contact, and the reading of its accelerometer."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class HeadformContact:
+    """The contact beside the hood's curve.
+
+    Attributes
+    ----------
+    friction : coefficient. damping : N s/m, while loading. onset : m over which it fades in.
+    rate_exponent : forces go with the rate of penetration to this power, 1 at 8 m/s.
+    skin_compliance : m/N, of the headform's skin in series with the hood.
+    """
+
+    friction: float
+    damping: float
+    onset: float
+    rate_exponent: float = 0.0
+    skin_compliance: float = 0.0
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What an accelerometer gives before it is filtered and written down.
+
+    Attributes
+    ----------
+    acceleration : (n, 2) g, normal and tangential. channel_class : of the filter, 0 for none.
+    clock : recorded duration over the true one.
+    """
+
+    acceleration: Array
+    channel_class: float
+    clock: float = 1.0

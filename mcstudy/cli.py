@@ -244,6 +244,43 @@ def models(
         console.print(table)
 
 
+@app.command()
+def effects(
+    name: Annotated[
+        str | None, typer.Argument(help="An effect, for its parameters and signature.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """List the effects that a model can be extended with, or describe one."""
+    from studies import catalogue
+
+    if as_json:
+        _print_json(
+            {"effects": catalogue.describe_effects()}
+            if name is None
+            else catalogue.describe_effect(name)
+        )
+        return
+    console = Console()
+    if name is None:
+        table = RichTable("effect", "what it is", "models", "parameters")
+        for row in catalogue.describe_effects():
+            table.add_row(row["name"], row["title"], ", ".join(row["models"]),
+                          ", ".join(p["name"] for p in row["parameters"]))  # fmt: skip
+        console.print(table)
+        return
+    described = catalogue.describe_effect(name)
+    console.print(f"{described['name']}: {described['title']}", markup=False)
+    for key in ("signature", "confusable", "separated_by", "source"):
+        text = described[key] if isinstance(described[key], str) else ", ".join(described[key])
+        console.print(f"{key.replace('_', ' ')}: {text or 'nothing'}", markup=False)
+    table = RichTable("parameter", "unit", "none", "prior", "range", "meaning")
+    for row in described["parameters"]:
+        table.add_row(*(str(row[key]) for key in ("name", "unit", "none", "prior", "range",
+                                                  "meaning")))  # fmt: skip
+    console.print(table)
+
+
 def _print_analysis(
     analysis: dict[str, Any], summary: Iterable[Any], path: Path, *, quiet: bool, as_json: bool
 ) -> None:

@@ -277,6 +277,7 @@ def numbers_digest(study: SampledStudy, model: Simulator) -> dict[str, str]:
             topics["design.levels"] = study.design.levels
     topics |= {f"inputs.{name}": entry for name, entry in table["inputs"].items()}
     topics |= {f"fixed.{name}": entry for name, entry in table["fixed"].items()}
+    topics |= {f"effects.{name}": entry for name, entry in table["effects"].items()}
     return {key: json.dumps(value, sort_keys=True) for key, value in topics.items()}
 
 

@@ -114,6 +114,7 @@ class CommonStudy(StudyTable):
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 0
     model: ModelChoice
     fixed: dict[str, Value] = {}
+    effects: dict[str, dict[str, FiniteFloat]] = {}
 
     @model_validator(mode="after")
     def _plain_name(self) -> "CommonStudy":

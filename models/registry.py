@@ -18,7 +18,11 @@ def model_names() -> tuple[str, ...]:
     return tuple(_MODELS)
 
 
-def load_model(name: str, options: Mapping[str, Any] | None = None) -> Model:
+def load_model(
+    name: str,
+    options: Mapping[str, Any] | None = None,
+    effects: Mapping[str, Mapping[str, float]] | None = None,
+) -> Model:
     """Return a model.
 
     Parameters
@@ -26,14 +30,19 @@ def load_model(name: str, options: Mapping[str, Any] | None = None) -> Model:
     name : str
     options : mapping, optional
         Choices that are not inputs, such as ``vehicle``.
+    effects : mapping, optional
+        By effect that is switched on the values of its parameters.
 
     Raises
     ------
     ValueError
-        If the model or an option is unknown.
+        If the model, an option or an effect is unknown.
     """
     if name not in _MODELS:
         raise ValueError(f"unknown model {name!r}: choose one of {', '.join(_MODELS)}")
     module, factory = _MODELS[name]
     build: Callable[..., Model] = getattr(import_module(module), factory)
-    return build(**dict(options or {}))
+    chosen = dict(options or {})
+    if effects:
+        chosen["effects"] = effects
+    return build(**chosen)

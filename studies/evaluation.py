@@ -16,13 +16,14 @@ class ModelArgument(TypedDict):
 
     name: str
     options: dict[str, Any]
+    effects: dict[str, dict[str, float]]
     version: str
 
 
 @functools.lru_cache(maxsize=4)
-def _model(name: str, options: str, version: str) -> Model:
+def _model(name: str, options: str, effects: str, version: str) -> Model:
     # The version tells two states of a file that an option names apart.
-    return load_model(name, json.loads(options))
+    return load_model(name, json.loads(options), json.loads(effects))
 
 
 def evaluate(
@@ -30,7 +31,10 @@ def evaluate(
 ) -> tuple[NDArray[np.float64], list[str]]:
     """Run rows of inputs and return outputs and statuses."""
     model = _model(
-        argument["name"], json.dumps(argument["options"], sort_keys=True), argument["version"]
+        argument["name"],
+        json.dumps(argument["options"], sort_keys=True),
+        json.dumps(argument["effects"], sort_keys=True),
+        argument["version"],
     )
     batch = model.run_batch(rows)
     return batch.outputs, batch.status

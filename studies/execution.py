@@ -34,10 +34,10 @@ def load_study_model(study: Study) -> Model:
     Raises
     ------
     UserError
-        If the model or an option is unknown.
+        If the model, an option or an effect is unknown.
     """
     try:
-        return load_model(study.model.name, study.model.options)
+        return load_model(study.model.name, study.model.options, study.effects)
     except (ValueError, TypeError) as error:
         raise UserError(f"model: {error}") from None
 
@@ -73,6 +73,7 @@ def run_rows(
         argument={
             "name": study.model.name,
             "options": study.model.options,
+            "effects": study.effects,
             "version": model.version,
         },
         inputs=rows,

@@ -19,8 +19,8 @@ from models.compilation import inlined_kernel, kernel
 
 Array = NDArray[np.float64]
 
-KNOTS = 16
-"""Knots that a combined law can hold."""
+KNOTS = 32
+"""Knots that a combined law can hold; one side has half of them at most."""
 
 DAMPING_ONSET = 0.005
 """Penetration (m) over which the damping of a crash contact fades in (assumed: thin against the

@@ -40,6 +40,9 @@ class Prior:
     first: float
     second: float
 
+    def __str__(self) -> str:
+        return f"{self.distribution} {self.first:g}, {self.second:g}"
+
     def quantile(self, probability: Array | float) -> Array:
         """Return the values at probabilities."""
         z = np.asarray(stats.norm.ppf(probability))

@@ -1,7 +1,7 @@
 """The hood meets a structure below it after a clearance.
 
-Beyond the clearance the force grows by ``stiffness * depth * (depth / 10 mm)^(power - 1)``, in straight
-pieces.
+Beyond the clearance the force grows by ``stiffness * depth * (depth / 10 mm)^(power - 1)``, in
+straight pieces.
 """
 
 from collections.abc import Mapping
@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 
 from models.contact.law import ForceCurve
-
 
 REFERENCE = 0.010
 """Depth (m) beyond the clearance at which all powers have the same force."""

@@ -3,9 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from models.headform.reading import Reading
 
 
 def apply(reading: Reading, parameters: Mapping[str, float]) -> Reading:
     """Return what the accelerometer reads with the effect."""
-    return replace(reading, acceleration=reading.acceleration + (parameters["offset"], 0.0))
+    offset = np.array([parameters["offset"], 0.0])
+    return replace(reading, acceleration=reading.acceleration + offset)

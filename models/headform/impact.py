@@ -29,12 +29,19 @@ class Impactor(NamedTuple):
     radius: float
 
 
+REFERENCE_RATE = 8.0
+"""Rate (m/s) at which a rate exponent changes no force."""
+SLOWEST_RATE = 0.1
+"""Rate (m/s) below which the rate counts no more (assumed)."""
+
+
 class Surface(NamedTuple):
-    """What is struck, beside its law: friction (1), damping (N s/m) and its onset (m)."""
+    """What is struck, beside its law: friction, damping (N s/m), its onset (m), rate exponent."""
 
     friction: float
     damping: float
     onset: float
+    exponent: float
 
 
 @kernel
@@ -69,6 +76,10 @@ def strike(impactor, surface, laws, count, rate, slide, step, stride, record, su
         elastic, viscous = contact_force(
             laws, 0, count, surface.damping, surface.onset, max(depth, 0.0), rate, deepest
         )
+        if surface.exponent > 0.0:
+            pace = max(rate, 0.0)
+            share = (pace * pace + SLOWEST_RATE**2) / (REFERENCE_RATE**2 + SLOWEST_RATE**2)
+            elastic *= share ** (0.5 * surface.exponent)
         force = elastic + viscous
         slip = slide - radius * spin
         drag = friction_coefficient(surface.friction, force, slip * slip, mass) * slip

@@ -22,6 +22,8 @@ from models.contact.law import (
 from models.criteria import clip_level, filter_cfc, head_injury_criterion
 from models.criteria.units import STANDARD_GRAVITY
 from models.declaration import read_inputs, read_outputs, run_rows
+from models.effects.chain import build_chain
+from models.effects.registry import EFFECTS, load_effect
 from models.headform.impact import (
     COLUMNS,
     DEEPEST,
@@ -42,6 +44,7 @@ from models.headform.impact import (
     Surface,
     strike,
 )
+from models.headform.reading import HeadformContact, Reading
 from models.protocol import (
     OK,
     Batch,
@@ -71,6 +74,9 @@ DAMPING_WEIGHT = 25.0
 MOST_STEPS = 4000
 """Steps a sample, at most."""
 
+ELASTIC = 1.000001
+"""Unloading ratio of what springs back fully; a force curve takes more than one."""
+
 TIME_LIMIT = "time_limit"
 NOT_FINITE = "not_finite"
 
@@ -85,8 +91,9 @@ def headform_names() -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class _Test:
-    """One test: impactor, laws, initial speeds and what the loop left behind."""
+    """One test: true inputs, impactor, initial speeds and what the loop left behind."""
 
+    values: Mapping[str, float]
     impactor: Impactor
     speeds: tuple[float, float]
     record: Array
@@ -118,6 +125,9 @@ class HeadformModel:
         Whether the headform's skin deforms; the case's paper found it negligible on a hood.
     channel_class : float
         Channel frequency class of the accelerometer; 0 leaves the signal as it is.
+    effects : mapping, optional
+        By effect of the catalogue the values of its parameters; those left out take the median of
+        their prior.
 
     Raises
     ------
@@ -126,7 +136,9 @@ class HeadformModel:
     """
 
     name = "headform"
-    effects: tuple[str, ...] = ()
+    effects: tuple[str, ...] = tuple(
+        effect for effect in EFFECTS if "headform" in load_effect(effect).models
+    )
     partial_status: frozenset[str] = frozenset()
 
     def __init__(
@@ -138,6 +150,7 @@ class HeadformModel:
         zone: str = "hood",
         skin: str = "rigid",
         channel_class: float = 1000.0,
+        effects: Mapping[str, Mapping[str, float]] | None = None,
     ) -> None:
         if headform not in headform_names():
             raise ValueError(
@@ -175,6 +188,8 @@ class HeadformModel:
             for item in read_inputs(_TABLE)
             if self._corridor is not None or item.name != "hood_stiffness"
         )
+        self._chain = build_chain(self.name, effects)
+        self._inputs += self._chain.inputs
 
     @property
     def version(self) -> str:
@@ -226,22 +241,34 @@ class HeadformModel:
         else:
             assert self._curve is not None
             curve = self._curve
-        return ForceCurve(
+        scaled = ForceCurve(
             curve.penetration,
             curve.force * values["hood_force_scale"],
             values["hood_unloading_ratio"],
             values["hood_damping"],
         )
+        return self._chain.act("curve", scaled, values)
 
     def _strike(self, values: Mapping[str, float]) -> _Test:
+        values = self._chain.act("inputs", values, values)
         curve = self.hood_curve(values)
+        contact = self._chain.act(
+            "contact",
+            HeadformContact(
+                values["friction_body_car"], curve.damping, values["hood_damping_onset"]
+            ),
+            values,
+        )
         laws = np.zeros((1, KNOTS, 4))
-        if self._skin is None:
+        skin = self._skin
+        if contact.skin_compliance > 0.0:
+            skin = _in_series(skin, contact.skin_compliance, float(curve.force[-1]))
+        if skin is None:
             count = law_of(curve, laws[0])
         else:
             count = combine_curves(
                 curve.penetration, curve.force, curve.unloading_ratio,
-                self._skin.penetration, self._skin.force, self._skin.unloading_ratio, laws[0],
+                skin.penetration, skin.force, skin.unloading_ratio, laws[0],
             )  # fmt: skip
         mass, radius = values["headform_mass"], 0.5 * values["headform_diameter"]
         impactor = Impactor(mass, self._gyration * mass * radius**2, radius)
@@ -249,7 +276,7 @@ class HeadformModel:
         secant = curve.force[1:] / curve.penetration[1:]
         slope = np.diff(curve.force) / np.diff(curve.penetration)
         stiffest = max(curve.unloading_ratio * max(secant.max(), slope[-1]), slope.max())
-        frequency = math.sqrt(stiffest / mass) + DAMPING_WEIGHT * curve.damping / mass
+        frequency = math.sqrt(stiffest / mass) + DAMPING_WEIGHT * contact.damping / mass
         stride = math.ceil(frequency / (PHASE * SAMPLING_RATE))
         stride = min(max(stride, FINEST), MOST_STEPS)
         speed, angle = values["impact_speed"], values["impact_angle"]
@@ -258,12 +285,13 @@ class HeadformModel:
         summary = np.zeros(SUMMARY)
         strike(
             impactor,
-            Surface(values["friction_body_car"], curve.damping, values["hood_damping_onset"]),
+            Surface(contact.friction, contact.damping, contact.onset, contact.rate_exponent),
             laws, count, *speeds, 1.0 / (SAMPLING_RATE * stride), stride, record, summary,
         )  # fmt: skip
         deepest = summary[DEEPEST]
         hood = float(interpolate_law(laws, 0, count, SURFACE, deepest))
         return _Test(
+            values=values,
             impactor=impactor,
             speeds=speeds,
             record=record[: int(summary[SAMPLES])].copy(),
@@ -276,9 +304,17 @@ class HeadformModel:
         quiet = round(QUIET * SAMPLING_RATE)
         forces = test.record[:, [NORMAL, TANGENTIAL]] / (test.impactor.mass * STANDARD_GRAVITY)
         padded = np.pad(forces, ((quiet, quiet), (0, 0)))
-        if self.channel_class == 0.0:
-            return padded
-        return filter_cfc(padded, SAMPLING_RATE, self.channel_class)
+        reading = self._chain.act("signal", Reading(padded, self.channel_class), test.values)
+        signal = reading.acceleration
+        if reading.channel_class > 0.0:
+            signal = filter_cfc(signal, SAMPLING_RATE, reading.channel_class)
+        if reading.clock == 1.0:
+            return signal
+        # What the recorder calls a time after first contact is that time over the clock's factor.
+        sample = np.arange(signal.shape[0])
+        true = quiet + (sample - quiet) / reading.clock
+        columns = [np.interp(true, sample, column) for column in signal.T]
+        return np.stack(columns, axis=1)
 
     def _judge(self, test: _Test) -> tuple[str, dict[str, float]]:
         """Return the status of a test and its outputs."""
@@ -334,6 +370,14 @@ class HeadformModel:
         }
         hood = {"force": (padded(NORMAL, 0.0, 0.0), "N"), "penetration": (depth, "m")}
         return {"head": history_of(time, head), "hood": history_of(time, hood)}
+
+
+def _in_series(skin: ForceCurve | None, compliance: float, force: float) -> ForceCurve:
+    """Return a skin with a spring in series that springs back fully."""
+    spring = ForceCurve(np.array([0.0, compliance * force]), np.array([0.0, force]), ELASTIC)
+    if skin is None:
+        return spring
+    return ForceCurve(skin.penetration + compliance * skin.force, skin.force, skin.unloading_ratio)
 
 
 def _skin() -> ForceCurve:

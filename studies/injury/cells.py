@@ -40,7 +40,8 @@ def cells_of(study: InjuryStudy) -> Iterator[Cell]:
                 front,
                 MonteCarloStudy(
                     format=study.format, kind="monte-carlo", name=study.name, title=study.title,
-                    seed=study.seed, model=model, fixed=study.fixed, design=study.design,
+                    seed=study.seed, model=model, fixed=study.fixed, effects=study.effects,
+                    design=study.design,
                     inputs=study.inputs | changes.inputs, dependence=study.dependence,
                     max_failure_rate=study.max_failure_rate, report=Report(histories=0),
                 ),

@@ -27,6 +27,7 @@ def sweep(
     names = [item.name for item in loaded.inputs]
     rows = np.array([[complete_inputs(loaded, case)[name] for name in names] for case in cases])
     argument: ModelArgument = {
+        "effects": {},
         "name": model,
         "options": dict(options or {}),
         "version": loaded.version,

@@ -18,6 +18,7 @@ EFFECTS: tuple[str, ...] = (
     "hood_yield",
     "unloading_slope",
     "rate_dependent_hood",
+    "hood_inertia",
     "skin_compliance",
     # The accelerometer, in the order in which a signal passes through it.
     "sensor_gain",

@@ -36,12 +36,18 @@ SLOWEST_RATE = 0.1
 
 
 class Surface(NamedTuple):
-    """What is struck, beside its law: friction, damping (N s/m), its onset (m), rate exponent."""
+    """What is struck, beside its law.
+
+    Friction, damping (N s/m) and its onset (m), rate exponent, mass of the hood (kg) that the
+    headform sets in motion and the depth (m) over which it does.
+    """
 
     friction: float
     damping: float
     onset: float
     exponent: float
+    moved: float
+    moved_depth: float
 
 
 @kernel
@@ -81,6 +87,14 @@ def strike(impactor, surface, laws, count, rate, slide, step, stride, record, su
             share = (pace * pace + SLOWEST_RATE**2) / (REFERENCE_RATE**2 + SLOWEST_RATE**2)
             elastic *= share ** (0.5 * surface.exponent)
         force = elastic + viscous
+        if surface.moved > 0.0:
+            # Mass of the hood takes up the headform's speed as it is reached, and keeps it.
+            ratio = max(deepest, 0.0) / surface.moved_depth
+            rest = math.exp(-ratio * ratio)
+            if rate > 0.0 and depth >= deepest:
+                growth = 2.0 * surface.moved * ratio * rest / surface.moved_depth
+                force += growth * rate * rate
+            force *= mass / (mass + surface.moved * (1.0 - rest))
         slip = slide - radius * spin
         drag = friction_coefficient(surface.friction, force, slip * slip, mass) * slip
         if k > 0:

@@ -17,6 +17,7 @@ class HeadformContact:
     friction : coefficient. damping : N s/m, while loading. onset : m over which it fades in.
     rate_exponent : forces go with the rate of penetration to this power, 1 at 8 m/s.
     skin_compliance : m/N, of the headform's skin in series with the hood.
+    moved_mass : kg of the hood that the headform sets in motion. moved_depth : m, over which.
     """
 
     friction: float
@@ -24,6 +25,8 @@ class HeadformContact:
     onset: float
     rate_exponent: float = 0.0
     skin_compliance: float = 0.0
+    moved_mass: float = 0.0
+    moved_depth: float = 0.01
 
 
 @dataclass(frozen=True)

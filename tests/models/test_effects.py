@@ -165,6 +165,29 @@ def test_a_soft_skin_softens_the_start_and_springs_back() -> None:
     assert abs(soft.outputs["energy_residual"]) < 1e-3
 
 
+@pytest.mark.parametrize("mass", [0.2, 1.0])
+def test_the_hoods_mass_takes_its_share_of_the_momentum(mass: float) -> None:
+    # A hood without stiffness: m v = (m + M) u once all of its mass is reached (inelastic impact).
+    options = {"hood_curve": [[0.0, 0.0], [1.0, 0.001]], "channel_class": 0.0}
+    effects = {"hood_inertia": {"mass": mass, "depth": 0.01}}
+    run = load_model("headform", options, effects).run({"impact_speed": 8.0, "headform_mass": 2.5})
+    head, hood = run.histories["head"], run.histories["hood"]
+    speed = head.channels["velocity_normal"]
+    far = hood.channels["penetration"] > 0.05
+    np.testing.assert_allclose(speed[far], 2.5 * 8.0 / (2.5 + mass), rtol=2e-4)
+
+
+def test_the_first_peak_of_a_heavy_hood_grows_with_the_square_of_the_speed() -> None:
+    options = {"hood_curve": [[0.0, 0.0], [1.0, 0.001]], "channel_class": 0.0}
+    effects = {"hood_inertia": {"mass": 0.5, "depth": 0.01}}
+    model = load_model("headform", options, effects)
+    slow, fast = (
+        model.run({"impact_speed": speed}).histories["hood"].channels["force"].max()
+        for speed in (5.0, 10.0)
+    )
+    assert fast / slow == pytest.approx(4.0, rel=1e-2)
+
+
 @pytest.mark.parametrize(
     ("effects", "message"),
     [

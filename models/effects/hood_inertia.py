@@ -1,0 +1,16 @@
+"""The hood's own mass is set in motion: an inelastic impact spread over the first millimetres.
+
+A mass that is moved up to penetration x, ``mass * (1 - exp(-(x / depth)^2))``, has the headform's
+speed, so the headform loses momentum to it as it is reached. It stays with the headform until they
+part.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from models.headform.reading import HeadformContact
+
+
+def apply(contact: HeadformContact, parameters: Mapping[str, float]) -> HeadformContact:
+    """Return the contact with the effect."""
+    return replace(contact, moved_mass=parameters["mass"], moved_depth=parameters["depth"])

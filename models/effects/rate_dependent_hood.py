@@ -1,4 +1,8 @@
-"""The hood is stiffer when struck faster: a dashpot, a power of the rate, or both."""
+"""The hood is stiffer when struck faster: a dashpot, or a share of the force that grows.
+
+The share grows with a power of the rate while the hood is pushed in (G. Cowper, P. Symonds, Brown
+University, 1957; with exponent 1 a relative viscosity), and is nothing at rest.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,5 +15,6 @@ def apply(contact: HeadformContact, parameters: Mapping[str, float]) -> Headform
     return replace(
         contact,
         damping=contact.damping + parameters["damping"],
-        rate_exponent=contact.rate_exponent + parameters["exponent"],
+        rate_share=parameters["share"],
+        rate_exponent=parameters["exponent"],
     )

@@ -30,22 +30,22 @@ class Impactor(NamedTuple):
 
 
 REFERENCE_RATE = 8.0
-"""Rate (m/s) at which a rate exponent changes no force."""
-SLOWEST_RATE = 0.1
-"""Rate (m/s) below which the rate counts no more (assumed)."""
+"""Rate (m/s) at which a rate's share of the force is given: that of a headform test."""
 
 
 class Surface(NamedTuple):
     """What is struck, beside its law.
 
-    Friction, damping (N s/m) and its onset (m), rate exponent, mass of the hood (kg) that the
-    headform sets in motion and the depth (m) over which it does.
+    Friction, damping (N s/m) and its onset (m), share by which the rate raises the force at the
+    reference rate and the exponent with which it does, mass of the hood (kg) that the headform sets
+    in motion and the depth (m) over which it does.
     """
 
     friction: float
     damping: float
     onset: float
-    exponent: float
+    rate_share: float
+    rate_exponent: float
     moved: float
     moved_depth: float
 
@@ -82,10 +82,8 @@ def strike(impactor, surface, laws, count, rate, slide, step, stride, record, su
         elastic, viscous = contact_force(
             laws, 0, count, surface.damping, surface.onset, max(depth, 0.0), rate, deepest
         )
-        if surface.exponent > 0.0:
-            pace = max(rate, 0.0)
-            share = (pace * pace + SLOWEST_RATE**2) / (REFERENCE_RATE**2 + SLOWEST_RATE**2)
-            elastic *= share ** (0.5 * surface.exponent)
+        if surface.rate_share > 0.0 and rate > 0.0:
+            elastic *= 1.0 + surface.rate_share * (rate / REFERENCE_RATE) ** surface.rate_exponent
         force = elastic + viscous
         if surface.moved > 0.0:
             # Mass of the hood takes up the headform's speed as it is reached, and keeps it.

@@ -285,8 +285,8 @@ class HeadformModel:
         summary = np.zeros(SUMMARY)
         strike(
             impactor,
-            Surface(contact.friction, contact.damping, contact.onset, contact.rate_exponent,
-                    contact.moved_mass, contact.moved_depth),
+            Surface(contact.friction, contact.damping, contact.onset, contact.rate_share,
+                    contact.rate_exponent, contact.moved_mass, contact.moved_depth),
             laws, count, *speeds, 1.0 / (SAMPLING_RATE * stride), stride, record, summary,
         )  # fmt: skip
         deepest = summary[DEEPEST]

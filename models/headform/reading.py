@@ -15,7 +15,8 @@ class HeadformContact:
     Attributes
     ----------
     friction : coefficient. damping : N s/m, while loading. onset : m over which it fades in.
-    rate_exponent : forces go with the rate of penetration to this power, 1 at 8 m/s.
+    rate_share : by which the rate of penetration raises the force at 8 m/s.
+    rate_exponent : with which it does.
     skin_compliance : m/N, of the headform's skin in series with the hood.
     moved_mass : kg of the hood that the headform sets in motion. moved_depth : m, over which.
     """
@@ -23,7 +24,8 @@ class HeadformContact:
     friction: float
     damping: float
     onset: float
-    rate_exponent: float = 0.0
+    rate_share: float = 0.0
+    rate_exponent: float = 1.0
     skin_compliance: float = 0.0
     moved_mass: float = 0.0
     moved_depth: float = 0.01

@@ -140,20 +140,24 @@ def test_unloading_slope_is_seen_in_the_rebound_alone() -> None:
     assert steep.outputs["rebound_speed"] < base.outputs["rebound_speed"]
 
 
-def test_forces_of_a_rate_dependent_hood_go_with_the_power_of_the_rate() -> None:
+@pytest.mark.parametrize("exponent", [0.3, 1.0])
+def test_the_rate_raises_the_force_by_its_share(exponent: float) -> None:
     # At equal penetration early in the pulse, where the rate is nearly that of the impact.
-    effects = {"rate_dependent_hood": {"damping": 0.0, "exponent": 0.2}}
-    forces = []
+    effects = {"rate_dependent_hood": {"damping": 0.0, "share": 0.2, "exponent": exponent}}
     for speed in (4.0, 8.0, 16.0):
-        hood = struck(effects, channel_class=0.0, impact_speed=speed).histories["hood"]
-        force, depth = hood.channels["force"], hood.channels["penetration"]
-        forces.append(float(np.interp(0.002, depth[: force.argmax()], force[: force.argmax()])))
-    assert forces[1] / forces[0] == pytest.approx(2.0**0.2, rel=0.02)
-    assert forces[2] / forces[1] == pytest.approx(2.0**0.2, rel=0.02)
+        forces = []
+        for chosen in (None, effects):
+            hood = struck(chosen, channel_class=0.0, impact_speed=speed).histories["hood"]
+            force, depth = hood.channels["force"], hood.channels["penetration"]
+            rising = slice(0, int(force.argmax()))
+            forces.append(float(np.interp(0.002, depth[rising], force[rising])))
+        assert forces[1] / forces[0] == pytest.approx(
+            1.0 + 0.2 * (speed / 8.0) ** exponent, rel=0.01
+        )
 
 
 def test_a_dashpot_is_the_damping_of_the_base_law() -> None:
-    dashpot = struck({"rate_dependent_hood": {"damping": 80.0, "exponent": 0.0}})
+    dashpot = struck({"rate_dependent_hood": {"damping": 80.0, "share": 0.0}})
     assert dashpot.outputs == pytest.approx(struck(hood_damping=80.0).outputs)
 
 

@@ -13,7 +13,7 @@ from models.contact.law import ForceCurve
 
 REFERENCE = 0.010
 """Depth (m) beyond the clearance at which all powers have the same force."""
-DEPTHS = (0.002, 0.004, 0.006, 0.009, 0.013, 0.02, 0.04)
+DEPTHS = (0.002, 0.004, 0.007, 0.01, 0.014, 0.02, 0.04)
 """Depths (m) beyond the clearance at which a curved law is cut into straight pieces."""
 
 

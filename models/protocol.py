@@ -4,7 +4,7 @@ A model never raises for a row of inputs inside its ranges: a run that fails is 
 other than ``ok`` and NaN where an output has no value. A row of a batch depends on that row alone.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -151,6 +151,9 @@ class Model(Protocol):
 
     def run(self, inputs: Mapping[str, float]) -> Run:
         """Run once, with time histories; inputs left out take their nominal values."""
+
+    def observe(self, inputs: Mapping[str, float], outputs: Collection[str] = ()) -> Run:
+        """Run once for what a test records: time histories and the outputs that are named."""
 
     def run_batch(self, rows: Array) -> Batch:
         """Run (n, inputs) rows."""

@@ -106,7 +106,7 @@ def strike_region(
     n, segment = len(SEGMENTS), SEGMENTS.index(region)
     laws = np.zeros((1, KNOTS, 4))
     count = law_of(build_tissue(body)[region], laws[0])
-    ellipsoids = build_ellipsoids(body, [])
+    ellipsoids = build_ellipsoids(body, build_tissue(body), [])
     out = np.zeros((round(DURATION / STEP), 2))
     _strike(
         build_tree(body), joints, ellipsoids, place(standing_posture(body)), empty_loads(n),

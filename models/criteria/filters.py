@@ -5,12 +5,17 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import sosfiltfilt
+
+from models.compilation import kernel
 
 Array = NDArray[np.float64]
 
 CUTOFF_FACTOR = 2.0775
 """Hz of each pass's corner frequency per unit of channel frequency class (SAE J211-1)."""
+
+
+PADDING = 60
+"""Samples by which a signal is continued at either end, mirrored about its last point."""
 
 
 @functools.cache
@@ -21,7 +26,22 @@ def _sections(frequency_class: float, sampling_rate: float) -> Array:
     gain = wa * wa / scale
     a1 = 2.0 * (wa * wa - 1.0) / scale
     a2 = (1.0 - math.sqrt(2.0) * wa + wa * wa) / scale
-    return np.array([[gain, 2.0 * gain, gain, 1.0, a1, a2]])
+    return np.array([gain, 2.0 * gain, gain, a1, a2])
+
+
+@kernel
+def _pass(section, values):
+    """Filter values in place, from the state that a constant of the first value would leave."""
+    b0, b1, b2, a1, a2 = section[0], section[1], section[2], section[3], section[4]
+    # The gain at frequency zero is one, so a constant goes through unchanged.
+    first = (1.0 - b0) * values[0]
+    second = (b2 - a2) * values[0]
+    for k in range(values.shape[0]):
+        x = values[k]
+        y = b0 * x + first
+        first = b1 * x - a1 * y + second
+        second = b2 * x - a2 * y
+        values[k] = y
 
 
 def filter_cfc(signal: ArrayLike, sampling_rate: float, frequency_class: float = 1000.0) -> Array:
@@ -50,5 +70,20 @@ def filter_cfc(signal: ArrayLike, sampling_rate: float, frequency_class: float =
             f"{2.0 * CUTOFF_FACTOR * frequency_class:g} Hz, given {sampling_rate:g} Hz"
         )
     x = np.asarray(signal, dtype=np.float64)
-    sections = _sections(float(frequency_class), float(sampling_rate))
-    return np.asarray(sosfiltfilt(sections, x, axis=0, padlen=min(x.shape[0] - 1, 60)))
+    section = _sections(float(frequency_class), float(sampling_rate))
+    columns = [_there_and_back(section, column) for column in x.reshape(x.shape[0], -1).T]
+    return np.stack(columns, axis=1).reshape(x.shape)
+
+
+def _there_and_back(section: Array, x: Array) -> Array:
+    n, pad = x.size, min(x.size - 1, PADDING)
+    longer = np.empty(n + 2 * pad)
+    longer[pad : pad + n] = x
+    longer[:pad] = 2.0 * x[0] - x[pad:0:-1]
+    longer[pad + n :] = (
+        2.0 * x[-1] - x[n - 2 : n - 2 - pad : -1] if pad < n - 1 else (2.0 * x[-1] - x[n - 2 :: -1])
+    )
+    _pass(section, longer)
+    backwards = longer[::-1].copy()
+    _pass(section, backwards)
+    return backwards[::-1][pad : pad + n].copy()

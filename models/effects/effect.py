@@ -7,6 +7,8 @@ sampled like any other input. It acts at one stage of a run:
 - ``inputs``: on the values of the model's inputs, before anything is built;
 - ``curve``: on the loading curve of the hood that the head strikes;
 - ``contact``: on what the contact does beside its curve (rate, moving mass);
+- ``braking``, ``posture``, ``tissue``, ``road``: on the car's motion, the person's posture and
+  tissue, and the road of a crash;
 - ``signal``: on what the accelerometer reads.
 """
 
@@ -22,7 +24,7 @@ from models.protocol import Input
 
 Array = NDArray[np.float64]
 
-STAGES = ("inputs", "curve", "contact", "signal")
+STAGES = ("inputs", "curve", "contact", "braking", "posture", "tissue", "road", "signal")
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,8 @@ class Effect:
     Attributes
     ----------
     name, title : of the cause. stage : one of ``STAGES``. models : that it applies to.
-    parameters : by name.
+    parameters : by name. size : the parameter that says how large the effect is.
+    forms : functional forms by name; each fixes the values of some parameters.
     signature : where it shows. confusable : effects that look alike.
     separated_by : the measurement that tells them apart. source : of its form and numbers.
     apply : what the stage hands over and the parameters by name, to the same thing changed.
@@ -93,6 +96,8 @@ class Effect:
     stage: str
     models: tuple[str, ...]
     parameters: Mapping[str, Parameter]
+    size: str
+    forms: Mapping[str, Mapping[str, float]]
     signature: str
     confusable: tuple[str, ...]
     separated_by: str

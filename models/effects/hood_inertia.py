@@ -8,7 +8,7 @@ part.
 from collections.abc import Mapping
 from dataclasses import replace
 
-from models.headform.reading import HeadformContact
+from models.headform.contact import HeadformContact
 
 
 def apply(contact: HeadformContact, parameters: Mapping[str, float]) -> HeadformContact:

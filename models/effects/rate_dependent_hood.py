@@ -7,7 +7,7 @@ University, 1957; with exponent 1 a relative viscosity), and is nothing at rest.
 from collections.abc import Mapping
 from dataclasses import replace
 
-from models.headform.reading import HeadformContact
+from models.headform.contact import HeadformContact
 
 
 def apply(contact: HeadformContact, parameters: Mapping[str, float]) -> HeadformContact:

@@ -20,6 +20,15 @@ EFFECTS: tuple[str, ...] = (
     "rate_dependent_hood",
     "hood_inertia",
     "skin_compliance",
+    # The car, the person and the road of a crash.
+    "late_braking",
+    "brake_dive",
+    "muscle_tone",
+    "braced_posture",
+    "shoulder_compliance",
+    "wet_road",
+    "road_slope",
+    "restitution",
     # The accelerometer, in the order in which a signal passes through it.
     "sensor_gain",
     "sensor_offset",
@@ -44,18 +53,27 @@ def load_effect(name: str) -> Effect:
     row = data.load("effects.toml")["effects"][name]
     if row["stage"] not in STAGES:
         raise ValueError(f"effect {name!r}: unknown stage {row['stage']!r}")
+    if row["size"] not in row["parameters"]:
+        raise ValueError(f"effect {name!r}: its size {row['size']!r} is no parameter of it")
     return Effect(
         name=name,
         title=row["title"],
         stage=row["stage"],
         models=tuple(row["models"]),
         parameters={key: _parameter(key, entry) for key, entry in row["parameters"].items()},
+        size=row["size"],
+        forms={form: dict(fixed) for form, fixed in row.get("forms", {name: {}}).items()},
         signature=row["signature"],
         confusable=tuple(row["confusable"]),
         separated_by=row["separated_by"],
         source=row["source"],
         apply=import_module(f"models.effects.{name}").apply,
     )
+
+
+def effects_of(model: str) -> tuple[str, ...]:
+    """Return the effects that apply to a model."""
+    return tuple(name for name in EFFECTS if model in load_effect(name).models)
 
 
 def _parameter(name: str, row: dict[str, Any]) -> Parameter:

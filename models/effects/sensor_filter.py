@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from models.headform.reading import Reading
+from models.effects.reading import Reading
 
 
 def apply(reading: Reading, parameters: Mapping[str, float]) -> Reading:

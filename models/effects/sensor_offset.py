@@ -1,14 +1,15 @@
-"""The accelerometer is off zero, along the normal of the hood."""
+"""The accelerometer is off zero along its first axis, a headform's the normal of the hood."""
 
 from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from models.headform.reading import Reading
+from models.effects.reading import Reading
 
 
 def apply(reading: Reading, parameters: Mapping[str, float]) -> Reading:
     """Return what the accelerometer reads with the effect."""
-    offset = np.array([parameters["offset"], 0.0])
+    offset = np.zeros(reading.acceleration.shape[1])
+    offset[0] = parameters["offset"]
     return replace(reading, acceleration=reading.acceleration + offset)

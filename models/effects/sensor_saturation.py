@@ -1,14 +1,25 @@
-"""The accelerometer clips what is beyond its range."""
+"""The accelerometer clips what is beyond its range, or gives way gradually as it nears it.
+
+A reading ``a`` becomes ``a / (1 + |a / limit|^sharpness)^(1 / sharpness)``; from a sharpness of 50
+on it is clipped.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from models.headform.reading import Reading
+from models.effects.reading import Reading
+
+CLIPPING = 50.0
+"""Sharpness from which the knee is a corner."""
 
 
 def apply(reading: Reading, parameters: Mapping[str, float]) -> Reading:
     """Return what the accelerometer reads with the effect."""
-    limit = parameters["limit"]
-    return replace(reading, acceleration=np.clip(reading.acceleration, -limit, limit))
+    limit, sharpness = parameters["limit"], parameters["sharpness"]
+    a = reading.acceleration
+    if sharpness >= CLIPPING:
+        return replace(reading, acceleration=np.clip(a, -limit, limit))
+    knee = (1.0 + np.abs(a / limit) ** sharpness) ** (1.0 / sharpness)
+    return replace(reading, acceleration=a / knee)

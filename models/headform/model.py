@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,11 +19,13 @@ from models.contact.law import (
     interpolate_law,
     law_of,
 )
-from models.criteria import clip_level, filter_cfc, head_injury_criterion
+from models.criteria import clip_level, head_injury_criterion
 from models.criteria.units import STANDARD_GRAVITY
 from models.declaration import read_inputs, read_outputs, run_rows
 from models.effects.chain import build_chain
-from models.effects.registry import EFFECTS, load_effect
+from models.effects.reading import Reading, record_reading
+from models.effects.registry import effects_of
+from models.headform.contact import HeadformContact
 from models.headform.impact import (
     COLUMNS,
     DEEPEST,
@@ -44,7 +46,6 @@ from models.headform.impact import (
     Surface,
     strike,
 )
-from models.headform.reading import HeadformContact, Reading
 from models.protocol import (
     OK,
     Batch,
@@ -91,12 +92,12 @@ def headform_names() -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class _Test:
-    """One test: true inputs, impactor, initial speeds and what the loop left behind."""
+    """One test: impactor, initial speeds, what the loop left behind and the accelerometer read."""
 
-    values: Mapping[str, float]
     impactor: Impactor
     speeds: tuple[float, float]
     record: Array
+    acceleration: Array
     summary: Array
     dent: tuple[float, float]
 
@@ -136,9 +137,7 @@ class HeadformModel:
     """
 
     name = "headform"
-    effects: tuple[str, ...] = tuple(
-        effect for effect in EFFECTS if "headform" in load_effect(effect).models
-    )
+    effects: tuple[str, ...] = effects_of("headform")
     partial_status: frozenset[str] = frozenset()
 
     def __init__(
@@ -214,11 +213,21 @@ class HeadformModel:
         ValueError
             If an input is unknown or outside its range.
         """
+        return self.observe(inputs, [item.name for item in self.outputs])
+
+    def observe(self, inputs: Mapping[str, float], outputs: Collection[str] = ()) -> Run:
+        """Run once for what a test records: time histories and only the outputs that are named.
+
+        Raises
+        ------
+        ValueError
+            If an input is unknown or outside its range.
+        """
         values = complete_inputs(self, inputs)
         test = self._strike(values)
-        status, outputs = self._judge(test)
+        status, measured = self._judge(test, outputs)
         ended = "separation" if status == OK else status
-        return Run(values, status, ended, outputs, self._histories(test))
+        return Run(values, status, ended, measured, self._histories(test))
 
     def run_batch(self, rows: Array) -> Batch:
         """Run rows of inputs.
@@ -249,8 +258,8 @@ class HeadformModel:
         )
         return self._chain.act("curve", scaled, values)
 
-    def _strike(self, values: Mapping[str, float]) -> _Test:
-        values = self._chain.act("inputs", values, values)
+    def _strike(self, given: Mapping[str, float]) -> _Test:
+        values = self._chain.act("inputs", given, given)
         curve = self.hood_curve(values)
         contact = self._chain.act(
             "contact",
@@ -291,78 +300,82 @@ class HeadformModel:
         )  # fmt: skip
         deepest = summary[DEEPEST]
         hood = float(interpolate_law(laws, 0, count, SURFACE, deepest))
+        kept = record[: int(summary[SAMPLES])].copy()
         return _Test(
-            values=values,
             impactor=impactor,
             speeds=speeds,
-            record=record[: int(summary[SAMPLES])].copy(),
+            record=kept,
+            acceleration=self._acceleration(kept, mass, values),
             summary=summary,
             dent=(hood, hood * (1.0 - 1.0 / curve.unloading_ratio)),
         )
 
-    def _acceleration(self, test: _Test) -> Array:
+    def _acceleration(self, record: Array, mass: float, values: Mapping[str, float]) -> Array:
         """Return normal and tangential acceleration (g) with flight before and after, filtered."""
         quiet = round(QUIET * SAMPLING_RATE)
-        forces = test.record[:, [NORMAL, TANGENTIAL]] / (test.impactor.mass * STANDARD_GRAVITY)
-        padded = np.pad(forces, ((quiet, quiet), (0, 0)))
-        reading = self._chain.act("signal", Reading(padded, self.channel_class), test.values)
-        signal = reading.acceleration
-        if reading.channel_class > 0.0:
-            signal = filter_cfc(signal, SAMPLING_RATE, reading.channel_class)
-        if reading.clock == 1.0:
-            return signal
-        # What the recorder calls a time after first contact is that time over the clock's factor.
-        sample = np.arange(signal.shape[0])
-        true = quiet + (sample - quiet) / reading.clock
-        columns = [np.interp(true, sample, column) for column in signal.T]
-        return np.stack(columns, axis=1)
+        padded = np.zeros((record.shape[0] + 2 * quiet, 2))
+        forces = record[:, NORMAL : TANGENTIAL + 1]
+        padded[quiet : quiet + record.shape[0]] = forces / (mass * STANDARD_GRAVITY)
+        felt = Reading(padded, self.channel_class)
+        return record_reading(self._chain, values, felt, SAMPLING_RATE, origin=quiet)
 
-    def _judge(self, test: _Test) -> tuple[str, dict[str, float]]:
-        """Return the status of a test and its outputs."""
-        empty = dict.fromkeys((item.name for item in _OUTPUTS), math.nan)
+    def _judge(
+        self, test: _Test, wanted: Collection[str] | None = None
+    ) -> tuple[str, dict[str, float]]:
+        """Return the status of a test and its outputs, or those that are wanted."""
+        names = [item.name for item in _OUTPUTS if wanted is None or item.name in wanted]
+        empty = dict.fromkeys(names, math.nan)
         if not np.all(np.isfinite(test.record)):
             return NOT_FINITE, empty
         if math.isnan(test.summary[END_TIME]):
             return TIME_LIMIT, empty
-        acceleration = np.hypot(*self._acceleration(test).T)
+        measures = self._measures(test)
+        return OK, {name: measures[name]() for name in names}
+
+    def _measures(self, test: _Test) -> dict[str, Callable[[], float]]:
+        """Return how each output is had from a test that ended."""
+        acceleration = np.hypot(*test.acceleration.T)
         time = np.arange(acceleration.size) / SAMPLING_RATE
-        energy = 0.5 * test.impactor.mass * (test.speeds[0] ** 2 + test.speeds[1] ** 2)
         record, summary = test.record, test.summary
+        energy = 0.5 * test.impactor.mass * (test.speeds[0] ** 2 + test.speeds[1] ** 2)
         left = 0.5 * test.impactor.mass * (summary[REBOUND] ** 2 + summary[END_SLIDE] ** 2)
         left += 0.5 * test.impactor.inertia * summary[END_SPIN] ** 2
-        return OK, {
-            "hic15": head_injury_criterion(time, acceleration, 0.015)[0],
-            "hic36": head_injury_criterion(time, acceleration, 0.036)[0],
-            "clip_3ms": clip_level(time, acceleration),
-            "clip_3ms_consecutive": clip_level(time, acceleration, mode="consecutive"),
-            "peak_head_acceleration": float(acceleration.max()),
-            "peak_force": float(record[:, NORMAL].max()),
-            "hood_intrusion": test.dent[0],
-            "permanent_dent": test.dent[1],
-            "rebound_speed": float(summary[REBOUND]),
-            "contact_duration": float(summary[END_TIME]),
-            "head_angular_velocity": float(np.abs(record[:, SPIN]).max()),
-            "energy_residual": float((energy - summary[SPENT] - left) / energy),
+        return {
+            "hic15": lambda: head_injury_criterion(time, acceleration, 0.015)[0],
+            "hic36": lambda: head_injury_criterion(time, acceleration, 0.036)[0],
+            "clip_3ms": lambda: clip_level(time, acceleration),
+            "clip_3ms_consecutive": lambda: clip_level(time, acceleration, mode="consecutive"),
+            "peak_head_acceleration": lambda: float(acceleration.max()),
+            "peak_force": lambda: float(record[:, NORMAL].max()),
+            "hood_intrusion": lambda: test.dent[0],
+            "permanent_dent": lambda: test.dent[1],
+            "rebound_speed": lambda: float(summary[REBOUND]),
+            "contact_duration": lambda: float(summary[END_TIME]),
+            "head_angular_velocity": lambda: float(np.abs(record[:, SPIN]).max()),
+            "energy_residual": lambda: float((energy - summary[SPENT] - left) / energy),
         }
 
     def _histories(self, test: _Test) -> dict[str, History]:
         """Return the histories of headform and hood; time 0 is first contact."""
         quiet = round(QUIET * SAMPLING_RATE)
         record, last = test.record, test.record[-1]
-        acceleration = self._acceleration(test)
+        acceleration = test.acceleration
         before = np.arange(-quiet, 0) / SAMPLING_RATE
         after = np.arange(1, quiet + 1) / SAMPLING_RATE
         rate, slide = test.speeds
 
         def padded(column: int, first: float, end: float) -> Array:
-            return np.pad(record[:, column], quiet, constant_values=(first, end))
+            longer = np.full(record.shape[0] + 2 * quiet, end)
+            longer[:quiet] = first
+            longer[quiet : quiet + record.shape[0]] = record[:, column]
+            return longer
 
         depth = np.concatenate(
             [before * rate, record[:, PENETRATION], last[PENETRATION] + after * last[RATE]]
         )
         time = np.arange(-quiet, record.shape[0] + quiet) / SAMPLING_RATE
         head = {
-            "acceleration": (np.hypot(*acceleration.T), "g"),
+            "acceleration": (_resultant(acceleration), "g"),
             "acceleration_normal": (acceleration[:, 0], "g"),
             "acceleration_tangential": (acceleration[:, 1], "g"),
             "velocity_normal": (padded(RATE, rate, last[RATE]), "m/s"),
@@ -371,6 +384,12 @@ class HeadformModel:
         }
         hood = {"force": (padded(NORMAL, 0.0, 0.0), "N"), "penetration": (depth, "m")}
         return {"head": history_of(time, head), "hood": history_of(time, hood)}
+
+
+def _resultant(acceleration: Array) -> Array:
+    """Return the resultant of (n, 2); with nothing along the hood it keeps the normal's sign."""
+    normal, tangential = acceleration.T
+    return np.asarray(np.hypot(normal, tangential) if np.any(tangential) else normal.copy())
 
 
 def _in_series(skin: ForceCurve | None, compliance: float, force: float) -> ForceCurve:

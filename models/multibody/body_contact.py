@@ -18,10 +18,9 @@ from models.multibody.surfaces import (
 
 
 @inlined_kernel
-def apply_road_contacts(zones, ellipsoids, motion, loads, contacts, tree, power):
+def apply_road_contacts(zones, ellipsoids, road_surface, motion, loads, contacts, tree, power):
     """Add the loads of the road, the plane z = 0, on all segments."""
     road = zones.radius.shape[0]
-    mu = zones.friction[road]
     for i in range(tree.mass.shape[0]):
         contacts.segment_force[i, road] = 0.0
         if contacts.centre[i, 2] > ellipsoids.reach[i]:
@@ -43,6 +42,8 @@ def apply_road_contacts(zones, ellipsoids, motion, loads, contacts, tree, power)
         elastic, viscous = law_force(ellipsoids, law, penetration, -vz, contacts.largest[i, road])
         normal = elastic + viscous
         slip = vx * vx + vy * vy
+        wet = px > road_surface.wet_from
+        mu = road_surface.wet_friction if wet else road_surface.friction
         drag = friction_coefficient(mu, normal, slip, tree.mass[i])
         push(motion, loads, i, px, py, pz, -drag * vx, -drag * vy, normal)
         power[ROAD_NORMAL] += elastic * vz

@@ -1,13 +1,15 @@
 """The multibody crash model behind the model protocol."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models import data
 from models.declaration import read_inputs, read_outputs, run_rows
+from models.effects.chain import build_chain
+from models.effects.registry import effects_of
 from models.multibody import outcome
 from models.multibody.setup import Crash, build_crash
 from models.multibody.simulation import (
@@ -27,7 +29,7 @@ from models.multibody.simulation import (
 from models.multibody.surfaces import CHANNELS, empty_contacts
 from models.multibody.tree import empty_loads
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK, is_possible
-from models.protocol import OK, Batch, Input, Output, Run, complete_inputs
+from models.protocol import OK, Batch, Input, Output, Run, Scene, complete_inputs
 from models.vehicle.profile import Vehicle, load_vehicle
 
 Array = NDArray[np.float64]
@@ -60,22 +62,31 @@ class MultibodyModel:
         Name of a vehicle of the data folder.
     tick : float
         Finest step in s.
+    effects : mapping, optional
+        By effect of the catalogue the values of its parameters; those left out take the median of
+        their prior.
 
     Raises
     ------
     ValueError
-        If the vehicle is unknown or the step is not within 1 us to 0.2 ms.
+        If the vehicle or an effect is unknown or the step is not within 1 us to 0.2 ms.
     """
 
     name = "multibody"
-    effects: tuple[str, ...] = ()
+    effects: tuple[str, ...] = effects_of("multibody")
     partial_status = frozenset({NO_HEAD_CONTACT})
 
-    def __init__(self, vehicle: str = "family_car_1990s", tick: float = TICK) -> None:
+    def __init__(
+        self,
+        vehicle: str = "family_car_1990s",
+        tick: float = TICK,
+        effects: Mapping[str, Mapping[str, float]] | None = None,
+    ) -> None:
         if not 1e-6 <= float(tick) <= 2e-4:
             raise ValueError(f"tick must lie within 1e-6 and 2e-4 s, given {tick}")
         self.vehicle: Vehicle = load_vehicle(vehicle)
         self.tick = float(tick)
+        self._chain = build_chain(self.name, effects)
         n, zones = len(SEGMENTS), len(self.vehicle.zones)
         self._record = np.empty((int(TIME_LIMIT / self.tick) + 2, R_ZONES + zones + 1))
         self._frames = np.empty((int(TIME_LIMIT / FRAME_INTERVAL) + 2, 4 + 7 * n))
@@ -88,7 +99,7 @@ class MultibodyModel:
     @property
     def inputs(self) -> tuple[Input, ...]:
         """Inputs in order."""
-        return _INPUTS
+        return _INPUTS + self._chain.inputs
 
     @property
     def outputs(self) -> tuple[Output, ...]:
@@ -105,17 +116,27 @@ class MultibodyModel:
         """
         values = complete_inputs(self, inputs)
         raw = self._simulate(values)
+        return self._run_of(values, raw, None if isinstance(raw, str) else outcome.scene(raw))
+
+    def observe(self, inputs: Mapping[str, float], outputs: Collection[str] = ()) -> Run:
+        """Run once for what a test records: outputs and time histories, no scene.
+
+        All outputs come with it, whichever are named.
+
+        Raises
+        ------
+        ValueError
+            If an input is unknown or outside its range.
+        """
+        values = complete_inputs(self, inputs)
+        return self._run_of(values, self._simulate(values), None)
+
+    def _run_of(self, values: dict[str, float], raw: outcome.Raw | str, scene: Scene | None) -> Run:
         if isinstance(raw, str):
             return Run(values, raw, raw, self._empty())
         status, outputs = self._judge(raw)
-        return Run(
-            values,
-            status,
-            END_REASONS[int(raw.summary[S_REASON])],
-            outputs,
-            outcome.histories(raw),
-            outcome.scene(raw),
-        )
+        reason = END_REASONS[int(raw.summary[S_REASON])]
+        return Run(values, status, reason, outputs, outcome.histories(raw), scene)
 
     def run_batch(self, rows: Array) -> Batch:
         """Run rows of inputs.
@@ -152,7 +173,7 @@ class MultibodyModel:
         """Return what the step loop leaves behind, or the status that keeps it from starting."""
         if not is_possible(values["stature"], values["body_mass"], values["head_mass"]):
             return IMPOSSIBLE_BODY
-        crash = build_crash(values, self.vehicle)
+        crash = build_crash(values, self.vehicle, self._chain)
         return NO_CONTACT if crash is None else self._step(crash, values)
 
     def _step(self, crash: Crash, values: dict[str, float]) -> outcome.Raw:
@@ -175,13 +196,15 @@ class MultibodyModel:
         )
         work, head_contact, summary = np.zeros(CHANNELS), np.full(10, np.nan), np.zeros(SUMMARY)
         simulate(
-            crash.tree, crash.joints, crash.ellipsoids, crash.zones, crash.car_motion, settings,
+            crash.tree, crash.joints, crash.ellipsoids, crash.zones, crash.road,
+            crash.car_motion, settings,
             crash.motion, empty_loads(n), empty_contacts(n, zones, len(crash.ellipsoids.pairs)),
             empty_scratch(n), work, record, self._frames, head_contact, summary,
         )  # fmt: skip
         return outcome.Raw(
             crash=crash,
-            dive_angle=values["dive_angle"],
+            chain=self._chain,
+            values=values,
             record=record[: int(summary[S_RECORDS])],
             frames=self._frames[: int(summary[S_FRAMES])],
             work=work,

@@ -1,6 +1,7 @@
 """Outputs, histories and pictures of a finished run."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,8 @@ from models.criteria import (
     impact_angle,
 )
 from models.criteria.units import STANDARD_GRAVITY
+from models.effects.chain import EffectChain
+from models.effects.reading import Reading, record_reading
 from models.multibody.setup import Crash
 from models.multibody.simulation import (
     R_ACCELERATION,
@@ -64,7 +67,8 @@ class Raw:
     """What the step loop leaves behind; see ``simulate`` for the arrays."""
 
     crash: Crash
-    dive_angle: float
+    chain: EffectChain
+    values: Mapping[str, float]
     record: Array
     frames: Array
     work: Array
@@ -92,12 +96,13 @@ def _signals(raw: Raw) -> _Signals:
             [np.interp(time, record[:, R_TIME], record[:, first + k]) for k in range(3)], axis=1
         )
 
-    acceleration = filter_cfc(sampled(R_ACCELERATION), SAMPLING_RATE, LINEAR_CLASS)
+    felt = Reading(sampled(R_ACCELERATION) / STANDARD_GRAVITY, LINEAR_CLASS)
+    acceleration = record_reading(raw.chain, raw.values, felt, SAMPLING_RATE, origin=0)
     ground = raw.summary[S_GROUND_TIME]
     split = time.size if math.isinf(ground) else int(np.searchsorted(time, ground))
     return _Signals(
         time=time,
-        acceleration=np.linalg.norm(acceleration, axis=1) / STANDARD_GRAVITY,
+        acceleration=np.linalg.norm(acceleration, axis=1),
         spin=filter_cfc(sampled(R_SPIN), SAMPLING_RATE, ANGULAR_CLASS),
         spin_rate=filter_cfc(sampled(R_SPIN_RATE), SAMPLING_RATE, ANGULAR_CLASS),
         split=max(split, min(SHORTEST_PHASE, time.size)),
@@ -145,8 +150,9 @@ def _head_contact(raw: Raw, signals: _Signals) -> dict[str, float]:
     if not math.isfinite(contact[0]) or zone < 0:
         return {"head_impact_time": math.nan}
     vehicle, laws = raw.crash.vehicle, raw.crash.ellipsoids
+    dive = raw.chain.act("inputs", raw.values, raw.values)["dive_angle"]
     surface = surface_point(raw.crash.zones, zone, contact[[7, 9]])
-    wad = wrap_around_distance(vehicle.name, zone, static_point(vehicle, raw.dive_angle, surface))
+    wad = wrap_around_distance(vehicle.name, zone, static_point(vehicle, dive, surface))
     law = int(laws.surface_law[HEAD, zone])
     force = np.interp(signals.time, raw.record[:, R_TIME], raw.record[:, R_HEAD_CAR])
     car = slice(0, signals.split)

@@ -1,5 +1,6 @@
 """Assembly of a crash: body, car and initial state as the compiled core takes them."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +10,9 @@ from models import data
 from models.compilation import kernel
 from models.contact.geometry import ellipsoid_direction
 from models.contact.law import KNOTS, ForceCurve, combine_curves
+from models.effects.chain import EffectChain
 from models.multibody.car_contact import zone_separation
+from models.multibody.road import Road
 from models.multibody.surfaces import Ellipsoids, empty_contacts, shape_of, update_surfaces
 from models.multibody.tree import Motion, Tree, empty_motion, update_kinematics
 from models.pedestrian.anthropometry import PARENTS, SEGMENTS, Body, build_body, region_of
@@ -40,6 +43,7 @@ class Crash:
     joints: Joints
     ellipsoids: Ellipsoids
     zones: Zones
+    road: Road
     car_motion: CarMotion
     motion: Motion
 
@@ -147,18 +151,26 @@ def _stack(curves: list[ForceCurve]) -> tuple[Array, Array, NDArray[np.int64], A
 
 RIGID = ForceCurve(np.array([0.0, 1e-6]), np.array([0.0, 1e5]), 1.0 + 1e-9)
 """The road: 100 kN/mm, far stiffer than any tissue."""
+ELASTIC = 1.000001
+"""Unloading ratio of what springs back fully; a force curve takes more than one."""
 
 
-def build_ellipsoids(body: Body, zone_curves: list[ForceCurve]) -> Ellipsoids:
+def build_ellipsoids(
+    body: Body,
+    tissue: Mapping[str, ForceCurve],
+    zone_curves: list[ForceCurve],
+    returned: float = 1.0,
+) -> Ellipsoids:
     """Return the surfaces of a body and their laws against zones, road and each other.
 
     Parameters
     ----------
     body : Body
+    tissue : of its regions.
     zone_curves : list of ForceCurve
         The car's zones, in order.
+    returned : factor on the share of the energy that the road gives back.
     """
-    tissue = build_tissue(body)
     regions = list(tissue)
     bodies = [tissue[region] for region in regions]
     # Surfaces: the zones, the road, and every region as the counterpart of another.
@@ -166,6 +178,14 @@ def build_ellipsoids(body: Body, zone_curves: list[ForceCurve]) -> Ellipsoids:
     laws = np.zeros((len(surfaces) * len(bodies), KNOTS, 4))
     counts = np.zeros(laws.shape[0], dtype=np.int64)
     _combine_all(*_stack(surfaces), *_stack(bodies), laws, counts)
+    if returned != 1.0:
+        k = len(zone_curves)
+        springy = [
+            replace(curve, unloading_ratio=max(curve.unloading_ratio / returned, ELASTIC))
+            for curve in bodies
+        ]
+        rows = slice(k * len(bodies), (k + 1) * len(bodies))
+        _combine_all(*_stack([RIGID]), *_stack(springy), laws[rows], counts[rows])
     damping = np.repeat([curve.damping for curve in surfaces], len(bodies))
     row = np.array([regions.index(region_of(segment)) for segment in SEGMENTS])
     zones = len(zone_curves)
@@ -188,15 +208,21 @@ def build_ellipsoids(body: Body, zone_curves: list[ForceCurve]) -> Ellipsoids:
     )
 
 
-def build_crash(inputs: dict[str, float], vehicle: Vehicle) -> Crash | None:
+def build_crash(
+    inputs: Mapping[str, float], vehicle: Vehicle, chain: EffectChain | None = None
+) -> Crash | None:
     """Return the crash for one set of inputs, or None if the body never touches the car.
 
     Parameters
     ----------
-    inputs : dict
+    inputs : mapping
         By name, in SI units; see ``data/multibody.toml``.
     vehicle : Vehicle
+    chain : effects that are switched on.
     """
+    chain = chain or EffectChain()
+    given = inputs
+    inputs = chain.act("inputs", given, given)
     body = build_body(inputs["age"], inputs["stature"], inputs["body_mass"], inputs["head_mass"])
     tree = build_tree(body)
     joints = build_joints(
@@ -206,13 +232,14 @@ def build_crash(inputs: dict[str, float], vehicle: Vehicle) -> Crash | None:
     for k, zone in enumerate(vehicle.zones):
         if zone.name == HOOD:
             force = inputs["hood_force_scale"] * curves[k].force
-            curves[k] = replace(curves[k], force=force)
-    ellipsoids = build_ellipsoids(body, curves)
+            curves[k] = chain.act("curve", replace(curves[k], force=force), given)
+    tissue: Mapping[str, ForceCurve] = chain.act("tissue", build_tissue(body), given)
+    road = chain.act("road", Road(inputs["friction_body_road"]), given)
+    ellipsoids = build_ellipsoids(body, tissue, curves, road.returned)
     zones = build_zones(
         vehicle,
         inputs["dive_angle"],
         inputs["friction_body_car"],
-        inputs["friction_body_road"],
     )
     motion = place(
         running_posture(
@@ -220,6 +247,7 @@ def build_crash(inputs: dict[str, float], vehicle: Vehicle) -> Crash | None:
             gait_phase=inputs["gait_phase"],
             facing_angle=inputs["facing_angle"],
             running_speed=inputs["running_speed"],
+            braced=chain.act("posture", 0.0, given),
         )
     )
     scratch = empty_contacts(len(SEGMENTS), len(vehicle.zones), len(ellipsoids.pairs))
@@ -242,11 +270,17 @@ def build_crash(inputs: dict[str, float], vehicle: Vehicle) -> Crash | None:
         joints=joints,
         ellipsoids=ellipsoids,
         zones=zones,
-        car_motion=braking_motion(
-            inputs["impact_speed"],
-            inputs["friction_tyre_road"],
-            inputs["yaw_rate"],
-            vehicle.rotation_centre,
+        road=road,
+        car_motion=chain.act(
+            "braking",
+            braking_motion(
+                inputs["impact_speed"],
+                inputs["friction_tyre_road"],
+                inputs["yaw_rate"],
+                vehicle.rotation_centre,
+                road.pull,
+            ),
+            given,
         ),
         motion=motion,
     )

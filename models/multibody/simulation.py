@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.compilation import inlined_kernel, kernel
-from models.criteria.units import STANDARD_GRAVITY
 from models.multibody.body_contact import apply_road_contacts, apply_self_contacts
 from models.multibody.car_contact import apply_car_contacts
 from models.multibody.integration import correct, predict
@@ -148,7 +147,7 @@ def stable_ticks(rate: float, tick: float, wanted: int) -> int:
 
 
 @inlined_kernel
-def total_energy(tree, motion, gravity):
+def total_energy(tree, motion, road_surface):
     """Return kinetic plus gravitational energy (J) of the tree."""
     energy = 0.0
     for i in range(tree.mass.shape[0]):
@@ -161,12 +160,13 @@ def total_energy(tree, motion, gravity):
                 + motion.rotation[i, 2, k] * motion.angular_velocity[i, 2]
             )
             energy += 0.5 * m * v * v + 0.5 * tree.inertia[i, k] * w * w
-        energy += m * gravity * motion.centre[i, 2]
+        energy += m * road_surface.weight * motion.centre[i, 2]
+        energy -= m * road_surface.pull * motion.centre[i, 0]
     return energy
 
 
 @inlined_kernel
-def evaluate(tree, joints, ellipsoids, zones, car, motion, loads, contacts, gravity, power):
+def evaluate(tree, joints, ellipsoids, zones, road_surface, car, motion, loads, contacts, power):
     """Fill loads and accelerations for the present state; write the powers (W) of all channels."""
     for k in range(CHANNELS):
         power[k] = 0.0
@@ -174,16 +174,16 @@ def evaluate(tree, joints, ellipsoids, zones, car, motion, loads, contacts, grav
         contacts.zone_force[j] = 0.0
     update_kinematics(tree, motion)
     for i in range(tree.mass.shape[0]):
-        loads.force[i, 0] = 0.0
+        loads.force[i, 0] = tree.mass[i] * road_surface.pull
         loads.force[i, 1] = 0.0
-        loads.force[i, 2] = -tree.mass[i] * gravity
+        loads.force[i, 2] = -tree.mass[i] * road_surface.weight
         loads.torque[i, 0] = 0.0
         loads.torque[i, 1] = 0.0
         loads.torque[i, 2] = 0.0
     update_surfaces(ellipsoids, motion, contacts)
     apply_joint_torques(tree, joints, motion, loads, power)
     apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, power)
-    apply_road_contacts(zones, ellipsoids, motion, loads, contacts, tree, power)
+    apply_road_contacts(zones, ellipsoids, road_surface, motion, loads, contacts, tree, power)
     apply_self_contacts(ellipsoids, motion, loads, contacts, tree, power)
     solve_accelerations(tree, motion, loads)
 
@@ -235,12 +235,12 @@ def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts):
 
 
 @inlined_kernel
-def _write_record(row, time, head, tree, motion, loads, contacts, car, record):
+def _write_record(row, time, head, tree, road_surface, motion, loads, contacts, car, record):
     record[row, R_TIME] = time
     ax, ay, az = centre_acceleration(motion, loads, head)
-    record[row, R_ACCELERATION] = ax
+    record[row, R_ACCELERATION] = ax - road_surface.pull
     record[row, R_ACCELERATION + 1] = ay
-    record[row, R_ACCELERATION + 2] = az + STANDARD_GRAVITY
+    record[row, R_ACCELERATION + 2] = az + road_surface.weight
     for k in range(3):
         w, q = 0.0, 0.0
         for j in range(3):
@@ -304,14 +304,14 @@ def _speeds(tree, motion):
 
 @kernel
 def simulate(
-    tree, joints, ellipsoids, zones, car_motion, settings,
+    tree, joints, ellipsoids, zones, road_surface, car_motion, settings,
     motion, loads, contacts, scratch, work, record, frames, head_contact, summary,
 ):  # fmt: skip
     """Run from the present state to rest.
 
     Parameters
     ----------
-    tree, joints, ellipsoids, zones, car_motion, settings
+    tree, joints, ellipsoids, zones, road_surface, car_motion, settings
         Constant data.
     motion, loads, contacts, scratch
         State and workspace, changed in place.
@@ -321,7 +321,6 @@ def simulate(
         to the car (3), normal (3); at its deepest: contact point (3), all in the car's frame.
     summary : (SUMMARY,), filled.
     """
-    gravity = STANDARD_GRAVITY
     car, power, old_power = scratch.car, scratch.power, scratch.old_power
     old_spin, old_alpha = scratch.old_spin, scratch.old_alpha
     old_velocity, old_acceleration = scratch.old_velocity, scratch.old_acceleration
@@ -329,8 +328,8 @@ def simulate(
     road = zones.radius.shape[0]
     time = 0.0
     car_state(car_motion, time, car)
-    evaluate(tree, joints, ellipsoids, zones, car, motion, loads, contacts, gravity, power)
-    summary[S_ENERGY_START] = total_energy(tree, motion, gravity)
+    evaluate(tree, joints, ellipsoids, zones, road_surface, car, motion, loads, contacts, power)
+    summary[S_ENERGY_START] = total_energy(tree, motion, road_surface)
     summary[S_GROUND_TIME] = math.inf
     summary[S_HEAD_ZONE] = -1.0
     rows, shots, steps, ticks = 0, 0, 0, 0
@@ -339,7 +338,9 @@ def simulate(
     reason = TIME_LIMIT
     while True:
         if rows < record.shape[0]:
-            _write_record(rows, time, head, tree, motion, loads, contacts, car, record)
+            _write_record(
+                rows, time, head, tree, road_surface, motion, loads, contacts, car, record
+            )
             rows += 1
         if ticks >= shots * settings.frame_every and shots < frames.shape[0]:
             _write_frame(shots, time, motion, contacts, car, frames)
@@ -358,7 +359,7 @@ def simulate(
         ticks += jump
         time = ticks * settings.tick
         car_state(car_motion, time, car)
-        evaluate(tree, joints, ellipsoids, zones, car, motion, loads, contacts, gravity, power)
+        evaluate(tree, joints, ellipsoids, zones, road_surface, car, motion, loads, contacts, power)
         correct(motion, loads, old_spin, old_velocity, old_alpha, old_acceleration, h)
         for k in range(CHANNELS):
             work[k] += 0.5 * h * (old_power[k] + power[k])
@@ -410,5 +411,5 @@ def simulate(
     summary[S_STEPS] = float(steps)
     summary[S_RECORDS] = float(rows)
     summary[S_FRAMES] = float(shots)
-    summary[S_ENERGY_END] = total_energy(tree, motion, gravity)
+    summary[S_ENERGY_END] = total_energy(tree, motion, road_surface)
     summary[S_CENTRE_SPEED] = speed

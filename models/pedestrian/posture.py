@@ -17,6 +17,14 @@ Array = NDArray[np.float64]
 # Sign of flexion about +y, which tips the upper end of a segment forwards.
 _FLEXION = {"thigh": -1.0, "shank": 1.0, "foot": -1.0, "upper_arm": -1.0, "forearm": -1.0}
 
+_JOINT = {
+    "thigh": "hip",
+    "shank": "knee",
+    "foot": "ankle",
+    "upper_arm": "shoulder",
+    "forearm": "elbow",
+}
+
 
 @dataclass(frozen=True)
 class Posture:
@@ -93,6 +101,11 @@ def _most_flexed_phase() -> float:
     return float(grid[np.argmax(_gait()["hip"](grid))])
 
 
+def _braced_flexion(region: str) -> float:
+    """Return the flexion (rad) of a limb joint in the braced stance."""
+    return math.radians(data.load("gait/braced.toml")[_JOINT[region]])
+
+
 def standing_posture(body: Body) -> Posture:
     """Return the upright body at rest, facing along x."""
     n = len(SEGMENTS)
@@ -101,7 +114,12 @@ def standing_posture(body: Body) -> Posture:
 
 
 def running_posture(
-    body: Body, *, gait_phase: float, facing_angle: float, running_speed: float
+    body: Body,
+    *,
+    gait_phase: float,
+    facing_angle: float,
+    running_speed: float,
+    braced: float = 0.0,
 ) -> Posture:
     """Return the posture of a running body.
 
@@ -114,6 +132,8 @@ def running_posture(
         rad, direction of running from x (the car's travel) towards y (its left).
     running_speed : float
         m/s.
+    braced : float
+        Share of the way from running to a braced stance (0 to 1), whose limbs do not swing.
     """
     lean = math.radians(data.load("gait/running.toml")["trunk_lean"])
     frequency = cycle_frequency(running_speed, body.stature)
@@ -128,6 +148,9 @@ def running_posture(
         pitch[i], rate[i] = pitch[PARENTS[i]], rate[PARENTS[i]]
         if region in _FLEXION:
             angle, per_cycle = sides["left" if segment.endswith("_left") else "right"][region]
+            if braced > 0.0:
+                angle += braced * (_braced_flexion(region) - angle)
+                per_cycle *= 1.0 - braced
             pitch[i] += _FLEXION[region] * angle
             rate[i] += _FLEXION[region] * per_cycle * frequency
         elif region in ("neck", "head"):

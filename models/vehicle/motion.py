@@ -13,16 +13,27 @@ from models.criteria.units import STANDARD_GRAVITY
 
 
 class CarMotion(NamedTuple):
-    """Parameters: impact speed (m/s), deceleration (m/s2), curvature (1/m), pivot distance (m)."""
+    """Prescribed motion.
+
+    Attributes
+    ----------
+    speed : m/s at impact. deceleration : m/s2. curvature : 1/m. pivot : m behind the front.
+    onset : s from impact to braking.
+    """
 
     speed: float
     deceleration: float
     curvature: float
     pivot: float
+    onset: float = 0.0
 
 
 def braking_motion(
-    impact_speed: float, friction_tyre_road: float, yaw_rate: float, rotation_centre: float
+    impact_speed: float,
+    friction_tyre_road: float,
+    yaw_rate: float,
+    rotation_centre: float,
+    pull: float = 0.0,
 ) -> CarMotion:
     """Return the motion of a car that brakes with all wheels at the friction limit.
 
@@ -30,25 +41,28 @@ def braking_motion(
     ----------
     impact_speed : m/s. friction_tyre_road : 1. yaw_rate : rad/s at impact, positive to the left.
     rotation_centre : m behind the front.
+    pull : m/s2, gravity along the travel of a car on a falling road.
+
+    A road too steep for the tyres leaves a tenth of the braking, so that the car still stops.
     """
+    braking = friction_tyre_road * STANDARD_GRAVITY
     curvature = yaw_rate / impact_speed if impact_speed > 0.0 else 0.0
-    return CarMotion(
-        impact_speed, friction_tyre_road * STANDARD_GRAVITY, curvature, rotation_centre
-    )
+    return CarMotion(impact_speed, max(braking - pull, 0.1 * braking), curvature, rotation_centre)
 
 
 def stopping_distance(motion: CarMotion) -> float:
     """Return the path (m) from impact to standstill."""
-    return motion.speed**2 / (2.0 * motion.deceleration)
+    return motion.speed * motion.onset + motion.speed**2 / (2.0 * motion.deceleration)
 
 
 @inlined_kernel
 def car_state(motion, time, car):
     """Write origin x, y (m), yaw (rad), their rates (m/s, m/s, rad/s) into ``car`` (6,)."""
     stop = motion.speed / motion.deceleration
-    t = min(time, stop)
+    coast = min(time, motion.onset)
+    t = min(time - coast, stop)
     speed = motion.speed - motion.deceleration * t
-    path = motion.speed * t - 0.5 * motion.deceleration * t * t
+    path = motion.speed * (coast + t) - 0.5 * motion.deceleration * t * t
     yaw = motion.curvature * path
     cosine, sine = math.cos(yaw), math.sin(yaw)
     if abs(yaw) > 1e-6:

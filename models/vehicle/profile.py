@@ -146,20 +146,16 @@ def _dive_shift(vehicle: Vehicle, dive_angle: float) -> Array:
     return np.array([-front, float(shift[1])])
 
 
-def build_zones(
-    vehicle: Vehicle, dive_angle: float, friction_body_car: float, friction_body_road: float
-) -> Zones:
+def build_zones(vehicle: Vehicle, dive_angle: float, friction_body_car: float) -> Zones:
     """Return the compiled form of the front of a diving car.
 
     Parameters
     ----------
     vehicle : Vehicle
-    dive_angle : rad, nose down. friction_body_car, friction_body_road : 1.
+    dive_angle : rad, nose down. friction_body_car : 1.
     """
     zones = vehicle.zones
     shift = _dive_shift(vehicle, dive_angle)
-    friction = np.full(len(zones) + 1, friction_body_car)
-    friction[-1] = friction_body_road
     origin = np.array([_turn(z.origin, dive_angle) + shift for z in zones])
     radius = np.array([z.radius for z in zones])
     direction = np.array([_turn(z.direction, dive_angle) for z in zones])
@@ -185,7 +181,7 @@ def build_zones(
         bend=vehicle.bend,
         joined=vehicle.joined,
         box=box,
-        friction=friction,
+        friction=np.full(len(zones), friction_body_car),
     )
 
 

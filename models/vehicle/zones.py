@@ -37,7 +37,7 @@ class Zones(NamedTuple):
     joined : (z, z) whether two zones share a border: what slides from one to the other stays in
         contact.
     box : (z, 4) m, lowest and highest x, lowest and highest z that a contact point can have.
-    friction : (z + 1,) against the body; the last one is the road's.
+    friction : (z,) against the body.
     """
 
     kind: Index

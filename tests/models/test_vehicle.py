@@ -173,7 +173,7 @@ def test_unknown_vehicle_is_refused() -> None:
 @pytest.mark.parametrize("degrees", [-1.0, 0.0, 2.0, 5.0])
 def test_dive_turns_the_front_down_about_its_pivot(name: str, degrees: float) -> None:
     vehicle, angle = load_vehicle(name), math.radians(degrees)
-    zones = build_zones(vehicle, angle, 0.3, 0.6)
+    zones = build_zones(vehicle, angle, 0.3)
     for j, zone in enumerate(vehicle.zones):
         # Height after a turn about (-dive_pivot, 0).
         lever = zone.origin[0] + vehicle.dive_pivot
@@ -192,8 +192,7 @@ def test_dive_turns_the_front_down_about_its_pivot(name: str, degrees: float) ->
     )
     rolls = zones.kind == ROLL
     assert (zones.origin[rolls, 0] + zones.radius[rolls]).max() == pytest.approx(0.0, abs=1e-12)
-    assert zones.friction[-1] == 0.6
-    assert (zones.friction[:-1] == 0.3).all()
+    assert (zones.friction == 0.3).all()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -234,7 +233,7 @@ def test_tape_to_the_windscreen_bridges_the_cowl(name: str) -> None:
 
 
 def test_surface_point_is_the_nearest_of_its_zone() -> None:
-    zones = build_zones(load_vehicle("family_car_1990s"), 0.02, 0.3, 0.6)
+    zones = build_zones(load_vehicle("family_car_1990s"), 0.02, 0.3)
     for j in range(zones.radius.size):
         inside = zones.origin[j] + 0.3 * zones.length[j] * zones.direction[j] + [-0.01, -0.02]
         found = surface_point(zones, j, inside)

@@ -1,11 +1,6 @@
-"""What effects may change of a headform test: its contact, and the reading of its accelerometer."""
+"""What effects may change of a headform's contact beside the hood's curve."""
 
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -29,18 +24,3 @@ class HeadformContact:
     skin_compliance: float = 0.0
     moved_mass: float = 0.0
     moved_depth: float = 0.01
-
-
-@dataclass(frozen=True)
-class Reading:
-    """What an accelerometer gives before it is filtered and written down.
-
-    Attributes
-    ----------
-    acceleration : (n, 2) g, normal and tangential. channel_class : of the filter, 0 for none.
-    clock : recorded duration over the true one.
-    """
-
-    acceleration: Array
-    channel_class: float
-    clock: float = 1.0

@@ -1,0 +1,15 @@
+"""The road falls, or rises, along the car's travel."""
+
+import math
+from collections.abc import Mapping
+
+from models.criteria.units import STANDARD_GRAVITY
+from models.multibody.road import Road
+
+
+def apply(road: Road, parameters: Mapping[str, float]) -> Road:
+    """Return the road with the effect."""
+    angle = parameters["angle"]
+    return road._replace(
+        pull=STANDARD_GRAVITY * math.sin(angle), weight=STANDARD_GRAVITY * math.cos(angle)
+    )

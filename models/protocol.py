@@ -152,8 +152,13 @@ class Model(Protocol):
     def run(self, inputs: Mapping[str, float]) -> Run:
         """Run once, with time histories; inputs left out take their nominal values."""
 
-    def observe(self, inputs: Mapping[str, float], outputs: Collection[str] = ()) -> Run:
-        """Run once for what a test records: time histories and the outputs that are named."""
+    def observe(
+        self,
+        inputs: Mapping[str, float],
+        channels: Collection[str],
+        outputs: Collection[str] = (),
+    ) -> Run:
+        """Run once for what a test records: channels ``<group>_<channel>`` and outputs by name."""
 
     def run_batch(self, rows: Array) -> Batch:
         """Run (n, inputs) rows."""

@@ -48,11 +48,11 @@ class ForceCurve:
 
     def __post_init__(self) -> None:
         d, f = self.penetration, self.force
-        if not (np.all(np.isfinite(d)) and np.all(np.isfinite(f))):
+        if not (np.isfinite(d).all() and np.isfinite(f).all()):
             raise ValueError("the knots of a force curve must be finite")
         if d.ndim != 1 or d.shape != f.shape or not 2 <= d.size <= KNOTS // 2:
             raise ValueError(f"a force curve takes 2 to {KNOTS // 2} knots, given {d.shape}")
-        if d[0] != 0.0 or f[0] != 0.0 or np.any(np.diff(d) <= 0.0) or np.any(np.diff(f) <= 0.0):
+        if d[0] != 0.0 or f[0] != 0.0 or not ((d[1:] > d[:-1]).all() and (f[1:] > f[:-1]).all()):
             raise ValueError("a force curve starts at (0, 0) and rises strictly in both columns")
         if not (self.unloading_ratio > 1.0 and self.damping >= 0.0):
             raise ValueError("unloading_ratio must exceed 1 and damping must not be negative")

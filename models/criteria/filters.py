@@ -71,7 +71,11 @@ def filter_cfc(signal: ArrayLike, sampling_rate: float, frequency_class: float =
         )
     x = np.asarray(signal, dtype=np.float64)
     section = _sections(float(frequency_class), float(sampling_rate))
-    columns = [_there_and_back(section, column) for column in x.reshape(x.shape[0], -1).T]
+    # Nothing stays nothing: the second axis of a straight impact is not filtered.
+    columns = [
+        _there_and_back(section, column) if np.any(column) else column
+        for column in x.reshape(x.shape[0], -1).T
+    ]
     return np.stack(columns, axis=1).reshape(x.shape)
 
 

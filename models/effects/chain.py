@@ -1,5 +1,6 @@
 """The effects that a model has switched on, in the order of the catalogue."""
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -25,11 +26,18 @@ class EffectChain:
 
     def act(self, stage: str, subject: Subject, values: Mapping[str, float]) -> Subject:
         """Return what a stage hands over, changed by its effects one after the other."""
-        for effect in self.effects:
-            if effect.stage == stage:
-                own = {name: values[effect.input_name(name)] for name in effect.parameters}
-                subject = effect.apply(subject, own)
+        for effect, names in self._stages.get(stage, ()):
+            subject = effect.apply(subject, {name: values[key] for name, key in names})
         return subject
+
+    @functools.cached_property
+    def _stages(self) -> dict[str, list[tuple[Effect, list[tuple[str, str]]]]]:
+        """By stage its effects, each with its parameters and their names among the inputs."""
+        stages: dict[str, list[tuple[Effect, list[tuple[str, str]]]]] = {}
+        for effect in self.effects:
+            names = [(name, effect.input_name(name)) for name in effect.parameters]
+            stages.setdefault(effect.stage, []).append((effect, names))
+        return stages
 
 
 def build_chain(model: str, chosen: Mapping[str, Mapping[str, float]] | None) -> EffectChain:

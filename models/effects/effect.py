@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special, stats
 
 from models.protocol import Input
 
@@ -47,7 +47,7 @@ class Prior:
 
     def quantile(self, probability: Array | float) -> Array:
         """Return the values at probabilities."""
-        z = np.asarray(stats.norm.ppf(probability))
+        z = np.asarray(special.ndtri(probability))
         if self.distribution == "lognormal":
             return np.asarray(self.first * np.exp(self.second * z))
         if self.distribution == "normal":

@@ -9,12 +9,17 @@ from dataclasses import replace
 
 from models.headform.contact import HeadformContact
 
+ONSET = 0.002
+"""m over which a dashpot fades in where the hood has none of its own (assumed: the force of a hood
+has no jump at first touch)."""
+
 
 def apply(contact: HeadformContact, parameters: Mapping[str, float]) -> HeadformContact:
     """Return the contact with the effect."""
     return replace(
         contact,
         damping=contact.damping + parameters["damping"],
+        onset=contact.onset if contact.damping > 0.0 else ONSET,
         rate_share=parameters["share"],
         rate_exponent=parameters["exponent"],
     )

@@ -213,21 +213,38 @@ class HeadformModel:
         ValueError
             If an input is unknown or outside its range.
         """
-        return self.observe(inputs, [item.name for item in self.outputs])
+        return self._run(complete_inputs(self, inputs), None, None)
 
-    def observe(self, inputs: Mapping[str, float], outputs: Collection[str] = ()) -> Run:
-        """Run once for what a test records: time histories and only the outputs that are named.
+    def observe(
+        self,
+        inputs: Mapping[str, float],
+        channels: Collection[str],
+        outputs: Collection[str] = (),
+    ) -> Run:
+        """Run once for what a test records: only the channels and outputs that are named.
+
+        Parameters
+        ----------
+        inputs : by name. channels : ``<group>_<channel>``, e.g. ``head_acceleration``.
+        outputs : by name.
 
         Raises
         ------
         ValueError
             If an input is unknown or outside its range.
         """
-        values = complete_inputs(self, inputs)
+        return self._run(complete_inputs(self, inputs), outputs, channels)
+
+    def _run(
+        self,
+        values: dict[str, float],
+        outputs: Collection[str] | None,
+        channels: Collection[str] | None,
+    ) -> Run:
         test = self._strike(values)
         status, measured = self._judge(test, outputs)
         ended = "separation" if status == OK else status
-        return Run(values, status, ended, measured, self._histories(test))
+        return Run(values, status, ended, measured, self._histories(test, channels))
 
     def run_batch(self, rows: Array) -> Batch:
         """Run rows of inputs.
@@ -329,7 +346,7 @@ class HeadformModel:
             return NOT_FINITE, empty
         if math.isnan(test.summary[END_TIME]):
             return TIME_LIMIT, empty
-        measures = self._measures(test)
+        measures = self._measures(test) if names else {}
         return OK, {name: measures[name]() for name in names}
 
     def _measures(self, test: _Test) -> dict[str, Callable[[], float]]:
@@ -355,35 +372,51 @@ class HeadformModel:
             "energy_residual": lambda: float((energy - summary[SPENT] - left) / energy),
         }
 
-    def _histories(self, test: _Test) -> dict[str, History]:
-        """Return the histories of headform and hood; time 0 is first contact."""
+    def _histories(self, test: _Test, wanted: Collection[str] | None) -> dict[str, History]:
+        """Return the histories of headform and hood, or those wanted; time 0 is first contact."""
         quiet = round(QUIET * SAMPLING_RATE)
         record, last = test.record, test.record[-1]
-        acceleration = test.acceleration
         before = np.arange(-quiet, 0) / SAMPLING_RATE
         after = np.arange(1, quiet + 1) / SAMPLING_RATE
         rate, slide = test.speeds
 
-        def padded(column: int, first: float, end: float) -> Array:
-            longer = np.full(record.shape[0] + 2 * quiet, end)
+        def padded(column: int, first: Array | float, end: Array | float) -> Array:
+            longer = np.empty(record.shape[0] + 2 * quiet)
             longer[:quiet] = first
-            longer[quiet : quiet + record.shape[0]] = record[:, column]
+            longer[quiet:-quiet] = record[:, column]
+            longer[-quiet:] = end
             return longer
 
-        depth = np.concatenate(
-            [before * rate, record[:, PENETRATION], last[PENETRATION] + after * last[RATE]]
-        )
-        time = np.arange(-quiet, record.shape[0] + quiet) / SAMPLING_RATE
-        head = {
-            "acceleration": (_resultant(acceleration), "g"),
-            "acceleration_normal": (acceleration[:, 0], "g"),
-            "acceleration_tangential": (acceleration[:, 1], "g"),
-            "velocity_normal": (padded(RATE, rate, last[RATE]), "m/s"),
-            "velocity_tangential": (padded(SLIDE, slide, last[SLIDE]), "m/s"),
-            "angular_velocity": (padded(SPIN, 0.0, last[SPIN]), "rad/s"),
+        sources: dict[str, dict[str, tuple[str, Callable[[], Array]]]] = {
+            "head": {
+                "acceleration": ("g", lambda: _resultant(test.acceleration)),
+                "acceleration_normal": ("g", lambda: test.acceleration[:, 0]),
+                "acceleration_tangential": ("g", lambda: test.acceleration[:, 1]),
+                "velocity_normal": ("m/s", lambda: padded(RATE, rate, last[RATE])),
+                "velocity_tangential": ("m/s", lambda: padded(SLIDE, slide, last[SLIDE])),
+                "angular_velocity": ("rad/s", lambda: padded(SPIN, 0.0, last[SPIN])),
+            },
+            "hood": {
+                "force": ("N", lambda: padded(NORMAL, 0.0, 0.0)),
+                "penetration": (
+                    "m",
+                    lambda: padded(
+                        PENETRATION, before * rate, last[PENETRATION] + after * last[RATE]
+                    ),
+                ),
+            },
         }
-        hood = {"force": (padded(NORMAL, 0.0, 0.0), "N"), "penetration": (depth, "m")}
-        return {"head": history_of(time, head), "hood": history_of(time, hood)}
+        time = np.arange(-quiet, record.shape[0] + quiet) / SAMPLING_RATE
+        found = {}
+        for group, channels in sources.items():
+            chosen = {
+                name: (source(), unit)
+                for name, (unit, source) in channels.items()
+                if wanted is None or f"{group}_{name}" in wanted
+            }
+            if chosen:
+                found[group] = history_of(time, chosen)
+        return found
 
 
 def _resultant(acceleration: Array) -> Array:

@@ -118,10 +118,17 @@ class MultibodyModel:
         raw = self._simulate(values)
         return self._run_of(values, raw, None if isinstance(raw, str) else outcome.scene(raw))
 
-    def observe(self, inputs: Mapping[str, float], outputs: Collection[str] = ()) -> Run:
-        """Run once for what a test records: outputs and time histories, no scene.
+    def observe(
+        self,
+        inputs: Mapping[str, float],
+        channels: Collection[str],
+        outputs: Collection[str] = (),
+    ) -> Run:
+        """Run once for what a test records: no scene, but all channels and outputs.
 
-        All outputs come with it, whichever are named.
+        Parameters
+        ----------
+        inputs : by name. channels, outputs : that must be there; the others cost nothing more.
 
         Raises
         ------

@@ -1,0 +1,379 @@
+"""Fit of a model with everything uncertain that is uncertain, and its evidence.
+
+The most probable values of the shared unknowns, of a cause's parameters and of every test's own
+nuisances by Gauss-Newton; the matrix of slopes is block-arrow, so tests are eliminated one by one.
+The evidence is Laplace's approximation.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcstudy.diagnosis.layout import Layout, Scatter
+from mcstudy.diagnosis.problem import FARTHEST, Form, Observation, Problem, value_at
+
+Array = NDArray[np.float64]
+
+SHARED_STEP, OWN_STEP = 0.1, 0.5
+"""Scores by which shared and a test's own values are moved for a slope."""
+MOST_STEPS = 12
+CONVERGED = 0.05
+"""Expected gain in log units below which a fit is done."""
+LINEAR = 0.7
+"""Share of the expected gain from which slopes are good enough to go on with."""
+LONGEST = 1.5
+"""Largest move of a shared score in one step."""
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Scores of the shared values (p,) and of each test's nuisances."""
+
+    shared: Array
+    own: tuple[Array, ...]
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Slopes that take runs, whitened, a test: (n, doubtful inputs) and (n, p)."""
+
+    doubtful: tuple[Array, ...]
+    shared: tuple[Array, ...]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fit.
+
+    Attributes
+    ----------
+    forms : causes switched on. scatter : size of the repeatability.
+    scores : most probable.
+    observations : simulated tests there. slopes : that took runs.
+    residuals, own_slopes : (n,), (n, q) whitened, a test.
+    covariance : (p, p) of the shared scores.
+    log_evidence : up to a constant that all fits of the same data share.
+    misfit : half the sum of squares of residuals and scores.
+    """
+
+    forms: tuple[Form, ...]
+    scatter: Scatter
+    scores: Scores
+    observations: tuple[Observation, ...]
+    slopes: Slopes
+    residuals: tuple[Array, ...]
+    own_slopes: tuple[Array, ...]
+    covariance: Array
+    log_evidence: float
+    misfit: float
+
+    @property
+    def shared_slopes(self) -> tuple[Array, ...]:
+        """Slopes (n, p) whitened, a test."""
+        return self.slopes.shared
+
+
+class FitError(Exception):
+    """A model run failed where the fit began."""
+
+
+def shared_names(problem: Problem, forms: Sequence[Form]) -> list[str]:
+    """Return the names of the shared values: unknowns, then ``<cause>.<parameter>``."""
+    return [u.name for u in problem.unknowns] + [
+        f"{form.cause}.{p.name}" for form in forms for p in form.free
+    ]
+
+
+@dataclass(frozen=True)
+class _Common:
+    """What all tests share at some scores: values of unknowns, parameters of effects by cause."""
+
+    unknowns: dict[str, float]
+    effects: dict[str, dict[str, float]]
+
+
+def _common(problem: Problem, forms: Sequence[Form], shared: Array) -> _Common:
+    count = len(problem.unknowns)
+    unknowns = {
+        unknown.name: value_at(unknown.quantile, float(score))
+        for unknown, score in zip(problem.unknowns, shared[:count], strict=True)
+    }
+    effects = {}
+    for form in forms:
+        effects[form.cause] = form.values(shared[count : count + len(form.free)])
+        count += len(form.free)
+    return _Common(unknowns, effects)
+
+
+def _observe(problem: Problem, common: _Common, layout: Layout, own: Array) -> Observation | None:
+    inputs = layout.inputs(own, problem.ranges)
+    inputs.update(common.unknowns)
+    return problem.simulate(inputs, common.effects)
+
+
+def observe_tests(
+    problem: Problem, forms: Sequence[Form], layouts: Sequence[Layout], scores: Scores
+) -> list[Observation] | None:
+    """Return the simulated tests at scores; None if a run fails."""
+    common = _common(problem, forms, scores.shared)
+    found = []
+    for layout, own in zip(layouts, scores.own, strict=True):
+        seen = _observe(problem, common, layout, own)
+        if seen is None:
+            return None
+        found.append(seen)
+    return found
+
+
+def start_scores(layouts: Sequence[Layout], shared: int) -> Scores:
+    """Return scores of zero."""
+    return Scores(np.zeros(shared), tuple(np.zeros(len(layout.names)) for layout in layouts))
+
+
+def fit(
+    problem: Problem,
+    layouts: Sequence[Layout],
+    forms: Sequence[Form],
+    start: Scores,
+    scatter: Scatter,
+    known: Slopes | None = None,
+) -> Fit:
+    """Return the most probable fit near a start.
+
+    Slopes are simulated anew only while the model is not as linear as they say.
+
+    Parameters
+    ----------
+    known : slopes from a fit near by, to begin with.
+
+    Raises
+    ------
+    FitError
+        If a run fails at the start.
+    """
+    forms = tuple(forms)
+    scores = start
+    seen = observe_tests(problem, forms, layouts, scores)
+    if seen is None:
+        raise FitError("a run fails where the fit begins")
+    misfit = _misfit(layouts, seen, scores, scatter)
+    slopes = known
+    for step in range(MOST_STEPS + 1):
+        fresh = slopes is None
+        if slopes is None:
+            slopes = _simulate_slopes(problem, forms, layouts, scores, seen, scatter)
+        residuals, own = _expand(layouts, seen, scores, slopes, scatter)
+        system = _System(residuals, own, slopes.shared, scores)
+        if system.expected_gain < CONVERGED or step == MOST_STEPS:
+            break
+        better = _descend(problem, forms, layouts, scores, system, scatter, misfit)
+        if better is None:
+            if fresh:
+                break
+            slopes = None
+            continue
+        moved, seen, lower = better
+        if misfit - lower < LINEAR * system.expected_gain:
+            slopes = None
+        scores, misfit = moved, lower
+    return Fit(
+        forms=forms,
+        scatter=scatter,
+        scores=scores,
+        observations=tuple(seen),
+        slopes=slopes,
+        residuals=tuple(residuals),
+        own_slopes=tuple(own),
+        covariance=np.linalg.inv(system.schur),
+        log_evidence=-misfit - 0.5 * system.log_determinant,
+        misfit=misfit,
+    )
+
+
+@dataclass(frozen=True)
+class Centre:
+    """A model linearised at scores: residuals (n,), slopes (n, q) and (n, p), a test."""
+
+    scores: Scores
+    residuals: tuple[Array, ...]
+    own_slopes: tuple[Array, ...]
+    shared_slopes: tuple[Array, ...]
+
+
+def linearise(
+    problem: Problem,
+    layouts: Sequence[Layout],
+    forms: Sequence[Form],
+    scores: Scores,
+    scatter: Scatter,
+) -> Centre | None:
+    """Return the model linearised at scores; None if a run fails there."""
+    seen = observe_tests(problem, forms, layouts, scores)
+    if seen is None:
+        return None
+    slopes = _simulate_slopes(problem, forms, layouts, scores, seen, scatter)
+    residuals, own = _expand(layouts, seen, scores, slopes, scatter)
+    return Centre(scores, tuple(residuals), tuple(own), slopes.shared)
+
+
+def residuals_at(
+    problem: Problem,
+    layouts: Sequence[Layout],
+    forms: Sequence[Form],
+    scores: Scores,
+    scatter: Scatter,
+) -> tuple[Array, ...] | None:
+    """Return the whitened residuals (n,) of every test at scores; None if a run fails."""
+    seen = observe_tests(problem, forms, layouts, scores)
+    if seen is None:
+        return None
+    return tuple(
+        layout.residual(part, own, scatter)
+        for layout, part, own in zip(layouts, seen, scores.own, strict=True)
+    )
+
+
+def solve(centre: Centre, residuals: Sequence[Array]) -> tuple[Scores, float]:
+    """Return the scores that suit residuals best in the linear model, and the misfit there."""
+    system = _System(residuals, centre.own_slopes, centre.shared_slopes, centre.scores)
+    move = system.step()
+    own = tuple(z + d for z, d in zip(centre.scores.own, move.own, strict=True))
+    squares = sum(float(r @ r) for r in residuals)
+    squares += float(centre.scores.shared @ centre.scores.shared)
+    squares += sum(float(z @ z) for z in centre.scores.own)
+    return Scores(centre.scores.shared + move.shared, own), 0.5 * squares - system.expected_gain
+
+
+def _misfit(
+    layouts: Sequence[Layout], seen: Sequence[Observation], scores: Scores, scatter: Scatter
+) -> float:
+    total = float(scores.shared @ scores.shared)
+    for layout, observation, own in zip(layouts, seen, scores.own, strict=True):
+        residual = layout.residual(observation, own, scatter)
+        total += float(residual @ residual) + float(own @ own)
+    return 0.5 * total
+
+
+def _expand(
+    layouts: Sequence[Layout],
+    seen: Sequence[Observation],
+    scores: Scores,
+    slopes: Slopes,
+    scatter: Scatter,
+) -> tuple[list[Array], list[Array]]:
+    """Return residuals and slopes in the tests' own nuisances."""
+    residuals, owns = [], []
+    for layout, observation, own, doubtful in zip(
+        layouts, seen, scores.own, slopes.doubtful, strict=True
+    ):
+        residual, analytic = layout.expand(observation, own, scatter)
+        residuals.append(residual)
+        owns.append(np.concatenate([doubtful, analytic], axis=1))
+    return residuals, owns
+
+
+def _simulate_slopes(
+    problem: Problem,
+    forms: Sequence[Form],
+    layouts: Sequence[Layout],
+    scores: Scores,
+    seen: Sequence[Observation],
+    scatter: Scatter,
+) -> Slopes:
+    """Return the slopes that take runs, by a step to whichever side runs."""
+    residuals = [
+        layout.residual(observation, own, scatter)
+        for layout, observation, own in zip(layouts, seen, scores.own, strict=True)
+    ]
+    here = _common(problem, forms, scores.shared)
+    doubtful = []
+    for layout, own, residual in zip(layouts, scores.own, residuals, strict=True):
+        table = np.zeros((residual.size, len(layout.test.doubtful)))
+        for k in range(table.shape[1]):
+            for step in (OWN_STEP, -OWN_STEP):
+                moved = own.copy()
+                moved[k] += step
+                there = _observe(problem, here, layout, moved)
+                if there is not None:
+                    table[:, k] = (residual - layout.residual(there, moved, scatter)) / step
+                    break
+        doubtful.append(table)
+    shared = [np.zeros((residual.size, scores.shared.size)) for residual in residuals]
+    for k in range(scores.shared.size):
+        for step in (SHARED_STEP, -SHARED_STEP):
+            moved_shared = scores.shared.copy()
+            moved_shared[k] += step
+            found = residuals_at(
+                problem, layouts, forms, Scores(moved_shared, scores.own), scatter
+            )
+            if found is not None:
+                for table, residual, other in zip(shared, residuals, found, strict=True):
+                    table[:, k] = (residual - other) / step
+                break
+    return Slopes(tuple(doubtful), tuple(shared))
+
+
+class _System:
+    """The normal equations, each test's own nuisances eliminated."""
+
+    def __init__(
+        self,
+        residuals: Sequence[Array],
+        own: Sequence[Array],
+        shared: Sequence[Array],
+        scores: Scores,
+    ) -> None:
+        p = scores.shared.size
+        self.schur = np.eye(p)
+        right = -scores.shared.copy()
+        self._blocks = []
+        self.log_determinant = 0.0
+        gain = 0.0
+        for r, a, b, z in zip(residuals, own, shared, scores.own, strict=True):
+            block = np.eye(a.shape[1]) + a.T @ a
+            cross = a.T @ b
+            pull = a.T @ r - z
+            solved = np.linalg.solve(block, np.column_stack([cross, pull]))
+            self.schur += b.T @ b - cross.T @ solved[:, :p]
+            right += b.T @ r - cross.T @ solved[:, p]
+            self.log_determinant += float(np.linalg.slogdet(block)[1])
+            gain += float(pull @ solved[:, p])
+            self._blocks.append(solved)
+        self.shared = np.linalg.solve(self.schur, right) if p else np.zeros(0)
+        self.log_determinant += float(np.linalg.slogdet(self.schur)[1]) if p else 0.0
+        self.expected_gain = 0.5 * (gain + float(right @ self.shared))
+
+    def step(self) -> Scores:
+        """Return the move of all scores."""
+        p = self.shared.size
+        own = tuple(b[:, p] - b[:, :p] @ self.shared for b in self._blocks)
+        return Scores(self.shared, own)
+
+
+def _descend(
+    problem: Problem,
+    forms: Sequence[Form],
+    layouts: Sequence[Layout],
+    scores: Scores,
+    system: _System,
+    scatter: Scatter,
+    misfit: float,
+) -> tuple[Scores, list[Observation], float] | None:
+    """Return scores that fit better along the step, with what was seen there."""
+    move = system.step()
+    longest = float(np.abs(move.shared).max(initial=0.0))
+    share = min(1.0, LONGEST / longest) if longest > 0.0 else 1.0
+    for _ in range(6):
+        trial = Scores(
+            np.clip(scores.shared + share * move.shared, -FARTHEST, FARTHEST),
+            tuple(z + share * d for z, d in zip(scores.own, move.own, strict=True)),
+        )
+        seen = observe_tests(problem, forms, layouts, trial)
+        if seen is not None:
+            value = _misfit(layouts, seen, trial, scatter)
+            if value < misfit:
+                return trial, seen, value
+        share *= 0.35
+    return None

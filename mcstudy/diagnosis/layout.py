@@ -1,0 +1,224 @@
+"""What is measured of one test as one vector, and what may be off in it.
+
+A test's own nuisances are, in this order: the inputs that are recorded with an uncertainty, the
+time origin, the offset of each signal, and the repeatability of the pulse: a few smooth factors in
+time and one a scalar. All are scores; ``NUISANCE`` holds their standard deviations.
+"""
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcstudy.diagnosis.problem import Observation, Test
+
+Array = NDArray[np.float64]
+
+TIME_ORIGIN = 2e-4
+"""s, standard deviation of a test's time origin (assumed: a few samples)."""
+TIME_ORIGIN_KNOWN = 2e-3
+"""s of shift between test and simulation from which a time origin counts as arbitrary."""
+MODES = 5
+"""Smooth factors of the pulse from test to test: cosines over its duration."""
+PULSE = 0.02
+"""Share of the peak at which a pulse begins and ends."""
+BIN = 5e-5
+"""s: finer samples are averaged."""
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Size of the repeatability, relative.
+
+    Attributes
+    ----------
+    level : of the whole pulse and of scalars. shape : of the slowest cosine; the k-th has a k-th.
+    """
+
+    level: float
+    shape: float
+
+    def sizes(self, modes: int, scalars: int) -> Array:
+        """Return the sizes of modes of the pulse, then of scalars."""
+        waves = [self.shape / k for k in range(1, modes)]
+        return np.array([*([self.level] if modes else []), *waves, *[self.level] * scalars])
+
+
+NO_SCATTER = Scatter(0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The vector of a test.
+
+    Attributes
+    ----------
+    test : Test. shift : s, of its time origin. window : s, begin and end of the pulse.
+    """
+
+    test: Test
+    shift: float
+    window: tuple[float, float]
+
+    @functools.cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the nuisances."""
+        return (
+            *self.test.doubtful,
+            *(("time_origin",) if self.test.signals else ()),
+            *(f"offset:{signal.name}" for signal in self.test.signals),
+            *(f"pulse:{k}" for k in range(MODES) if self.test.signals),
+            *(f"scatter:{scalar.name}" for scalar in self.test.scalars),
+        )
+
+    @functools.cached_property
+    def scattering(self) -> NDArray[np.bool_]:
+        """Which nuisances are repeatability."""
+        return np.array([name.startswith(("pulse:", "scatter:")) for name in self.names])
+
+    def scatter_sizes(self, scatter: Scatter) -> Array:
+        """Return the sizes of the nuisances that are repeatability, in order."""
+        return scatter.sizes(MODES if self.test.signals else 0, len(self.test.scalars))
+
+    @functools.cached_property
+    def _modes(self) -> tuple[Array, ...]:
+        """The smooth factors (n, MODES) at the times of each signal."""
+        return tuple(self.modes(signal.time) for signal in self.test.signals)
+
+    def inputs(self, scores: Array, ranges: Mapping[str, tuple[float, float]]) -> dict[str, float]:
+        """Return the inputs of the test at scores of its nuisances."""
+        values = dict(self.test.inputs)
+        for (name, sd), score in zip(self.test.doubtful.items(), scores, strict=False):
+            low, high = ranges[name]
+            values[name] = min(max(values[name] + sd * float(score), low), high)
+        return values
+
+    def modes(self, time: Array) -> Array:
+        """Return the smooth factors (n, MODES) at times."""
+        begin, end = self.window
+        phase = np.clip((time - begin) / (end - begin), 0.0, 1.0)
+        return np.asarray(np.cos(np.pi * phase[:, None] * np.arange(MODES)))
+
+    def residual(self, seen: Observation, scores: Array, scatter: Scatter) -> Array:
+        """Return the whitened difference of measured and simulated, (n,)."""
+        return self._assemble(seen, scores, scatter)[0]
+
+    def expand(self, seen: Observation, scores: Array, scatter: Scatter) -> tuple[Array, Array]:
+        """Return the whitened residual (n,) and its slope (n, k) in the nuisances but the inputs.
+
+        The slope is that of the simulated vector.
+        """
+        residual, columns = self._assemble(seen, scores, scatter, slope=True)
+        assert columns is not None
+        return residual, columns
+
+    def whitened(self, seen: Observation, scores: Array) -> Array:
+        """Return the simulated vector, whitened, without repeatability."""
+        return -self._assemble(seen, np.where(self.scattering, 0.0, scores), NO_SCATTER, measured=False)[0]
+
+    def cosine(self, signal: str, order: int, seen: Observation | None) -> Array:
+        """Return a cosine over the pulse of one signal, whitened (n,).
+
+        It is as high as the signal's peak, or has the shape of a simulated one.
+        """
+        parts = []
+        begin, end = self.window
+        for channel in self.test.signals:
+            values = np.zeros(channel.time.size)
+            if channel.name == signal:
+                phase = (channel.time - begin) / (end - begin)
+                inside = (phase >= 0.0) & (phase <= 1.0)
+                values[inside] = np.cos(np.pi * order * phase[inside])
+                if seen is None:
+                    values *= np.abs(channel.values).max()
+                else:
+                    time, shape = seen.signals[signal]
+                    values *= np.interp(channel.time - self.shift, time, shape)
+            parts.append(_whiten(values[:, None], channel.sd, channel.correlation)[:, 0])
+        return np.concatenate([*parts, np.zeros(len(self.test.scalars))])
+
+    def unit_scalar(self, name: str) -> Array:
+        """Return a scalar as large as it was measured, alone in the vector, whitened (n,)."""
+        size = sum(signal.time.size for signal in self.test.signals)
+        own = [s.value / s.sd if s.name == name else 0.0 for s in self.test.scalars]
+        return np.concatenate([np.zeros(size), own])
+
+    def _assemble(
+        self,
+        seen: Observation,
+        scores: Array,
+        scatter: Scatter,
+        *,
+        slope: bool = False,
+        measured: bool = True,
+    ) -> tuple[Array, Array | None]:
+        test = self.test
+        start = len(test.doubtful)
+        signals = len(test.signals)
+        own = len(self.names) - start
+        parts: list[Array] = []
+        slopes: list[Array] = []
+        if signals:
+            origin = self.shift + TIME_ORIGIN * scores[start]
+            offsets = scores[start + 1 : start + 1 + signals]
+            sizes = scatter.sizes(MODES, 0)
+            pulse = sizes * scores[start + 1 + signals : start + 1 + signals + MODES]
+            for k, signal in enumerate(test.signals):
+                time, values = seen.signals[signal.name]
+                shape = np.interp(signal.time - origin, time, values)
+                modes = self._modes[k]
+                factor = 1.0 + modes @ pulse
+                simulated = shape * factor + signal.sd * offsets[k]
+                given = signal.values if measured else 0.0
+                parts.append(_whiten((given - simulated)[:, None], signal.sd, signal.correlation)[:, 0])
+                if slope:
+                    table = np.zeros((signal.time.size, own))
+                    table[:, 0] = -TIME_ORIGIN * np.gradient(shape, signal.time) * factor
+                    table[:, 1 + k] = signal.sd
+                    table[:, 1 + signals : 1 + signals + MODES] = sizes * modes * shape[:, None]
+                    slopes.append(_whiten(table, signal.sd, signal.correlation))
+        first = own - len(test.scalars)
+        for k, scalar in enumerate(test.scalars):
+            value = seen.scalars[scalar.name]
+            simulated_value = value * (1.0 + scatter.level * scores[start + first + k])
+            given = scalar.value if measured else 0.0
+            parts.append(np.array([(given - simulated_value) / scalar.sd]))
+            if slope:
+                row = np.zeros((1, own))
+                row[0, first + k] = scatter.level * value / scalar.sd
+                slopes.append(row)
+        return np.concatenate(parts), np.concatenate(slopes) if slope else None
+
+
+def _whiten(table: Array, sd: float, correlation: float) -> Array:
+    """Return (n, k) columns over the noise, neighbours decorrelated."""
+    scaled = table / sd
+    if correlation == 0.0:
+        return scaled
+    scaled[1:] = (scaled[1:] - correlation * scaled[:-1]) / np.sqrt(1.0 - correlation**2)
+    return scaled
+
+
+def lay_out(test: Test, seen: Observation) -> Layout:
+    """Return the layout of a test, its pulse and time origin found with a first simulation."""
+    if not test.signals:
+        return Layout(test, 0.0, (0.0, 1.0))
+    signal = test.signals[0]
+    time, values = seen.signals[signal.name]
+    large = np.flatnonzero(np.abs(values) >= PULSE * np.abs(values).max())
+    window = (float(time[large[0]]), float(time[large[-1]]))
+    shift = _shift(signal.time, signal.values, time, values)
+    if abs(shift) < TIME_ORIGIN_KNOWN:
+        shift = 0.0
+    return Layout(test, shift, (window[0] + shift, window[1] + shift))
+
+
+def _shift(time: Array, values: Array, model_time: Array, model_values: Array) -> float:
+    """Return by how much (s) a measured signal is later than a simulated one."""
+    step = max(float(np.median(np.diff(time))), BIN)
+    measured = np.interp(np.arange(time[0], time[-1], step), time, values)
+    model = np.interp(np.arange(model_time[0], model_time[-1], step), model_time, model_values)
+    lag = int(np.argmax(np.correlate(measured, model, mode="full"))) - (model.size - 1)
+    return float(time[0] + lag * step - model_time[0])

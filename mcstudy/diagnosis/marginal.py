@@ -1,0 +1,146 @@
+"""The linear model about a fit, nuisances integrated out: scores and information of any shape.
+
+Tests are independent but for the shared values, so everything follows from one Gram matrix a test
+of its slopes and of the shapes that are asked about. Many simulated data sets cost one matrix
+product.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcstudy.diagnosis.fit import Fit
+from mcstudy.diagnosis.layout import Layout, Scatter
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """Shapes with all nuisances integrated out.
+
+    Attributes
+    ----------
+    information : (m, m) of the shapes. score : (d, m) of d data sets.
+    log_likelihood : (d,) of the data without the shapes, up to a constant.
+    """
+
+    information: Array
+    score: Array
+    log_likelihood: Array
+
+
+class Marginal:
+    """The linear model about a fit, with shapes.
+
+    Parameters
+    ----------
+    fitted : Fit. layouts : of its tests. shapes : (n, m) whitened, a test.
+    """
+
+    def __init__(self, fitted: Fit, layouts: Sequence[Layout], shapes: Sequence[Array]) -> None:
+        self._scatter = fitted.scatter
+        self._layouts = tuple(layouts)
+        self._scattering = [layout.scattering for layout in layouts]
+        self._shared = fitted.scores.shared.size
+        self._gram, self._product = [], []
+        for residual, own, shared, shape, z in zip(
+            fitted.residuals, fitted.own_slopes, fitted.shared_slopes, shapes, fitted.scores.own,
+            strict=True,
+        ):  # fmt: skip
+            table = np.concatenate([own, shared, shape], axis=1)
+            # Residual at scores of zero, in the linear model.
+            whole = residual + own @ z + shared @ fitted.scores.shared
+            self._gram.append(table.T @ table)
+            self._product.append((table.T @ whole)[None])
+
+    @property
+    def squares(self) -> Array:
+        """Sums of squares (m,) of the shapes as they are."""
+        first = self._scattering[0].size + self._shared
+        return np.asarray(sum(np.diag(gram)[first:] for gram in self._gram))
+
+    def measured(self) -> list[Array]:
+        """Return the products (1, k) of the measured data with the columns, a test."""
+        return self._product
+
+    def draw(self, count: int, scatter: Scatter, rng: np.random.Generator) -> list[Array]:
+        """Return products (count, k) of data sets that the model without shapes makes."""
+        common = rng.standard_normal((count, self._shared))
+        products = []
+        for gram, scale in zip(self._gram, self._scales(scatter), strict=True):
+            values, vectors = np.linalg.eigh(gram)
+            root = vectors * np.sqrt(np.maximum(values, 0.0))
+            noise = rng.standard_normal((count, values.size)) @ root.T
+            q = scale.size
+            own = rng.standard_normal((count, q)) * scale
+            noise += own @ gram[:q] + common @ gram[q : q + self._shared]
+            products.append(noise)
+        return products
+
+    def reduce(self, products: Sequence[Array], scatter: Scatter) -> Reduced:
+        """Return the shapes with nuisances integrated out, at a size of the repeatability."""
+        p = self._shared
+        rest = self._gram[0].shape[0] - self._scattering[0].size
+        information = np.zeros((rest, rest))
+        score = np.zeros((products[0].shape[0], rest))
+        quadratic = np.zeros(score.shape[0])
+        log_determinant = 0.0
+        for gram, product, scale in zip(
+            self._gram, products, self._scales(scatter), strict=True
+        ):
+            q = scale.size
+            block = np.eye(q) + scale[:, None] * gram[:q, :q] * scale
+            cross = scale[:, None] * gram[:q, q:]
+            own = product[:, :q] * scale
+            inverse = np.linalg.inv(block)
+            information += gram[q:, q:] - cross.T @ inverse @ cross
+            weighed = own @ inverse
+            score += product[:, q:] - weighed @ cross
+            quadratic += np.einsum("dk,dk->d", weighed, own)
+            log_determinant += float(np.linalg.slogdet(block)[1])
+        block = np.eye(p) + information[:p, :p]
+        inverse = np.linalg.inv(block)
+        cross, own = information[:p, p:], score[:, :p]
+        quadratic += np.einsum("dk,kl,dl->d", own, inverse, own)
+        log_determinant += float(np.linalg.slogdet(block)[1]) if p else 0.0
+        return Reduced(
+            information=information[p:, p:] - cross.T @ inverse @ cross,
+            score=score[:, p:] - own @ inverse @ cross,
+            log_likelihood=0.5 * (quadratic - log_determinant),
+        )
+
+    def _scales(self, scatter: Scatter) -> list[Array]:
+        """Return what each nuisance's slope is multiplied by for another repeatability."""
+        scales = []
+        for layout in self._layouts:
+            scale = np.ones(layout.scattering.size)
+            ratio = layout.scatter_sizes(scatter) / layout.scatter_sizes(self._scatter)
+            scale[layout.scattering] = ratio
+            scales.append(scale)
+        return scales
+
+
+def log_bayes_factor(information: Array, score: Array, size: float = 1.0) -> Array:
+    """Return the log evidence that shapes with coefficients N(0, size^2) add, (d,).
+
+    Parameters
+    ----------
+    information : (m, m). score : (d, m).
+    """
+    values, vectors = np.linalg.eigh(information)
+    values = np.maximum(values, 0.0)
+    turned = score @ vectors
+    gain = 0.5 * (turned**2 / (values + size**-2)).sum(axis=1)
+    return np.asarray(gain - 0.5 * np.log1p(size**2 * values).sum())
+
+
+def quadratic_form(information: Array, score: Array) -> tuple[Array, int]:
+    """Return the explained sum of squares (d,) of shapes and their rank."""
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    values, vectors = np.linalg.eigh(information / scale[:, None] / scale)
+    kept = values > 1e-6 * values.max(initial=0.0)
+    turned = (score / scale) @ vectors[:, kept]
+    return np.asarray((turned**2 / values[kept]).sum(axis=1)), int(kept.sum())

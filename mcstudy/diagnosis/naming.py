@@ -1,0 +1,231 @@
+"""Which cause: every one refitted in all its forms, ranked by evidence, with an open set."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+from scipy import special
+
+from mcstudy.diagnosis.fit import (
+    Centre,
+    Fit,
+    FitError,
+    Scores,
+    fit,
+    linearise,
+    residuals_at,
+    shared_names,
+    solve,
+)
+from mcstudy.diagnosis.layout import Layout, Scatter
+from mcstudy.diagnosis.problem import Cause, Form, Problem
+from mcstudy.diagnosis.screening import estimate_scatter, remaining
+from mcstudy.diagnosis.templates import (
+    drifts,
+    fine_discrepancy,
+    score_grid,
+    smooth_discrepancy,
+)
+
+Array = NDArray[np.float64]
+
+DISTINCT = 3.0
+"""Log units of evidence within which causes cannot be told apart, and below which none is named."""
+STRUCTURE = 0.01
+"""p-value below which a fit leaves structure behind."""
+MOST_OF_IT = 0.8
+"""Share of the explained misfit from which a cause is named although something remains."""
+SURVEY = Scatter(0.02, 0.02)
+"""Repeatability with which forms are tried before it is estimated."""
+ROUNDS = 2
+"""Times that the repeatability is estimated and the fit repeated."""
+UNSEEN = 0.05
+"""Sum of squares over the noise below which a form changes nothing that was measured."""
+FARTHEST_START = 4.0
+"""Score beyond which no fit begins."""
+CLOSE, WORSE = 30.0, 1.5
+"""Log units and factor by which a form, or a second start, may promise less than the best."""
+APART = 0.9
+"""Scores that two starts are apart, at least."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A cause with its best fit and its evidence above the base model's, forms averaged."""
+
+    cause: Cause
+    fitted: Fit
+    form: Form
+    log_evidence: float
+    forms: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What a fit leaves behind: p-value, share of the misfit explained, best drift, discrepancy."""
+
+    p_value: float
+    share: float
+    drift: tuple[str, float]
+    discrepancy: float
+
+
+def settle(problem: Problem, layouts: Sequence[Layout], fitted: Fit) -> Fit:
+    """Return a fit with the repeatability that makes its data most probable."""
+    for _ in range(ROUNDS):
+        scatter = estimate_scatter(fitted, layouts, None)
+        start = rescale(layouts, fitted, scatter)
+        fitted = fit(problem, layouts, fitted.forms, start, scatter, fitted.slopes)
+    return fitted
+
+
+def rescale(layouts: Sequence[Layout], fitted: Fit, scatter: Scatter) -> Scores:
+    """Return a fit's scores for another repeatability, the pulses unchanged as far as plausible."""
+    own = []
+    for layout, scores in zip(layouts, fitted.scores.own, strict=True):
+        moved = scores.copy()
+        ratio = layout.scatter_sizes(fitted.scatter) / layout.scatter_sizes(scatter)
+        moved[layout.scattering] = np.clip(scores[layout.scattering] * ratio, -3.0, 3.0)
+        own.append(moved)
+    return Scores(fitted.scores.shared, tuple(own))
+
+
+@dataclass(frozen=True)
+class Survey:
+    """A form tried over its prior: misfits and the scores to start from, most promising first."""
+
+    form: Form
+    misfits: tuple[float, ...]
+    starts: tuple[Scores, ...]
+
+
+def survey(
+    problem: Problem,
+    layouts: Sequence[Layout],
+    forms: tuple[Form, ...],
+    centre: Centre,
+    form: Form,
+) -> Survey | None:
+    """Return how a form does over its prior, the nuisances solved for in the linear model.
+
+    None if it changes nothing that was measured, or cannot run.
+
+    Parameters
+    ----------
+    forms, centre : the model without the form, linearised. form : the one to add.
+    """
+    tried: list[tuple[float, Scores]] = []
+    changes = 0.0
+    for scores in score_grid(form):
+        start = Scores(np.concatenate([centre.scores.shared, scores]), centre.scores.own)
+        residuals = residuals_at(problem, layouts, (*forms, form), start, SURVEY)
+        if residuals is None:
+            continue
+        for found, before in zip(residuals, centre.residuals, strict=True):
+            changes = max(changes, float(np.sum((found - before) ** 2)))
+        solved, misfit = solve(centre, residuals)
+        shared = np.clip(solved.shared, -FARTHEST_START, FARTHEST_START)
+        own = tuple(np.clip(z, -FARTHEST_START, FARTHEST_START) for z in solved.own)
+        whole = misfit + 0.5 * float(scores @ scores)
+        tried.append((whole, Scores(np.concatenate([shared, scores]), own)))
+    if changes < UNSEEN:
+        return None
+    tried.sort(key=lambda entry: entry[0])
+    free = len(form.free)
+    chosen = [tried[0]]
+    for misfit, start in tried[1:]:
+        apart = np.abs(start.shared[-free:] - chosen[0][1].shared[-free:]).max(initial=0.0)
+        if misfit < WORSE * tried[0][0] + CLOSE and apart >= APART:
+            chosen.append((misfit, start))
+            break
+    return Survey(form, tuple(m for m, _ in chosen), tuple(start for _, start in chosen))
+
+
+def fit_form(
+    problem: Problem, layouts: Sequence[Layout], forms: tuple[Form, ...], surveyed: Survey
+) -> Fit | None:
+    """Return the best fit of forms and one more; None if it cannot run."""
+    best: Fit | None = None
+    for start in surveyed.starts:
+        try:
+            found = fit(problem, layouts, (*forms, surveyed.form), start, SURVEY)
+        except FitError:
+            continue
+        if best is None or found.log_evidence > best.log_evidence:
+            best = found
+    return None if best is None else settle(problem, layouts, best)
+
+
+def rank_causes(
+    problem: Problem,
+    layouts: Sequence[Layout],
+    base: Fit,
+    causes: Sequence[Cause],
+    workers: int,
+    most: int,
+) -> list[Candidate]:
+    """Return the causes by evidence above a base's, best first.
+
+    Those that change nothing that was measured, or cannot run, are left out.
+
+    Parameters
+    ----------
+    base : with the forms that are already there. most : forms that are refitted, the most
+        promising ones.
+    """
+    unknowns = len(problem.unknowns)
+    shared = base.scores.shared.copy()
+    shared[:unknowns] = 0.0
+    own = tuple(np.zeros_like(z) for z in base.scores.own)
+    centre = linearise(problem, layouts, base.forms, Scores(shared, own), SURVEY)
+    if centre is None:
+        return []
+    taken = {form.cause for form in base.forms}
+    forms = [form for c in causes if c.name not in taken for form in c.forms]
+    pool = Parallel(n_jobs=workers)
+    surveys = pool(
+        delayed(survey)(problem, layouts, base.forms, centre, form) for form in forms
+    )
+    seen = sorted((s for s in surveys if s is not None), key=lambda s: s.misfits[0])
+    promising = [s for s in seen if s.misfits[0] < WORSE * seen[0].misfits[0] + CLOSE][:most]
+    fits = pool(delayed(fit_form)(problem, layouts, base.forms, s) for s in promising)
+    candidates = []
+    for cause in causes:
+        found = [
+            (tried.form, fitted)
+            for tried, fitted in zip(promising, fits, strict=True)
+            if tried.form.cause == cause.name and fitted is not None
+        ]
+        if not found:
+            continue
+        evidence = np.array([fitted.log_evidence for _, fitted in found]) - base.log_evidence
+        form, fitted = found[int(np.argmax(evidence))]
+        candidates.append(
+            Candidate(
+                cause,
+                fitted,
+                form,
+                float(special.logsumexp(evidence) - np.log(evidence.size)),
+                {entry.name: float(v) for (entry, _), v in zip(found, evidence, strict=True)},
+            )
+        )
+    return sorted(candidates, key=lambda candidate: -candidate.log_evidence)
+
+
+def examine(
+    problem: Problem, layouts: Sequence[Layout], base: Fit, extended: Fit
+) -> Remainder:
+    """Return what an extended fit leaves behind, against what it explained."""
+    names = shared_names(problem, extended.forms)
+    p_value, left, discrepancy, drift = remaining(
+        extended,
+        layouts,
+        drifts(layouts, extended, names),
+        smooth_discrepancy(layouts, extended),
+        fine_discrepancy(layouts, extended),
+    )
+    gained = max(base.misfit - extended.misfit, 0.0)
+    whole = gained + max(left, 0.0)
+    return Remainder(p_value, gained / whole if whole > 0.0 else 1.0, drift, discrepancy)

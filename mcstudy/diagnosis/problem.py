@@ -1,0 +1,155 @@
+"""What a diagnosis works on: tests, what is not known of them, and a model to simulate them with.
+
+All that is uncertain is written in *scores*: standard normal numbers from which a prior's quantile
+makes the value. So every prior is the same, and a parameter cannot leave its range.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+Array = NDArray[np.float64]
+Quantile = Callable[[float], float]
+"""Probability to value."""
+
+FARTHEST = 8.0
+"""Score beyond which a quantile is not followed."""
+
+
+def value_at(quantile: Quantile, score: float) -> float:
+    """Return the value of a prior at a score."""
+    return float(quantile(float(special.ndtr(min(max(score, -FARTHEST), FARTHEST)))))
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A measured channel of a test, in the model's unit.
+
+    Attributes
+    ----------
+    name : as the model calls it. time, values : (n,) s and unit.
+    sd : standard deviation of the noise. correlation : of neighbouring samples of it.
+    """
+
+    name: str
+    time: Array
+    values: Array
+    sd: float
+    correlation: float = 0.0
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A measured scalar, its standard uncertainty, in the model's unit."""
+
+    name: str
+    value: float
+    sd: float
+
+
+@dataclass(frozen=True)
+class Test:
+    """A measured test.
+
+    Attributes
+    ----------
+    name : id. inputs : every input that is recorded or fixed, as recorded.
+    doubtful : standard uncertainty of the recorded inputs that have one.
+    signals, scalars : measured, and independent of each other.
+    derived : scalars that follow from the signals; they judge, but are no evidence.
+    covariates : what a slow change may follow, the order of the tests at least.
+    """
+
+    name: str
+    inputs: Mapping[str, float]
+    doubtful: Mapping[str, float]
+    signals: tuple[Signal, ...]
+    scalars: tuple[Scalar, ...]
+    derived: tuple[Scalar, ...]
+    covariates: Mapping[str, float]
+
+    # Not a test of pytest's, whatever its name says.
+    __test__ = False
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """An unknown that all tests share: name of the input, quantile of its prior."""
+
+    name: str
+    quantile: Quantile
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a cause: name, unit, meaning, quantile of the prior, the value for none."""
+
+    name: str
+    unit: str
+    meaning: str
+    quantile: Quantile
+    none: float
+
+
+@dataclass(frozen=True)
+class Form:
+    """A functional form of a cause.
+
+    Attributes
+    ----------
+    cause, name : of the cause and of the form.
+    fixed : values of parameters that the form fixes. free : parameters that are fitted.
+    """
+
+    cause: str
+    name: str
+    fixed: Mapping[str, float]
+    free: tuple[Parameter, ...]
+
+    def values(self, scores: Sequence[float] | Array) -> dict[str, float]:
+        """Return the parameters by name at scores of the free ones."""
+        free = {p.name: value_at(p.quantile, float(z)) for p, z in zip(self.free, scores, strict=True)}
+        return {**self.fixed, **free}
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A named cause with its forms, the parameter that says how large it is, and what tells it."""
+
+    name: str
+    title: str
+    forms: tuple[Form, ...]
+    size: str
+    signature: str
+    confusable: tuple[str, ...]
+    separated_by: str
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What a simulated test gives: (time, values) by signal, values by scalar."""
+
+    signals: Mapping[str, tuple[Array, Array]]
+    scalars: Mapping[str, float]
+
+
+class Simulate(Protocol):
+    """Simulates one test; None if the run fails."""
+
+    def __call__(
+        self, inputs: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]
+    ) -> Observation | None: ...
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Tests, unknowns that they share, the model, and the inputs' valid ranges."""
+
+    tests: tuple[Test, ...]
+    unknowns: tuple[Unknown, ...]
+    simulate: Simulate
+    ranges: Mapping[str, tuple[float, float]]

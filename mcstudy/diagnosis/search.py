@@ -1,0 +1,216 @@
+"""The search: adequate or not, which cause, whether a second one, or none of the catalogue."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mcstudy.diagnosis.fit import Fit, fit, shared_names, start_scores
+from mcstudy.diagnosis.layout import Layout, lay_out
+from mcstudy.diagnosis.naming import (
+    DISTINCT,
+    MOST_OF_IT,
+    STRUCTURE,
+    SURVEY,
+    Candidate,
+    Remainder,
+    examine,
+    rank_causes,
+    rescale,
+    settle,
+)
+from mcstudy.diagnosis.problem import Cause, Problem
+from mcstudy.diagnosis.screening import LEVEL, Screening, estimate_scatter, screen
+from mcstudy.diagnosis.templates import (
+    Template,
+    all_forms,
+    cause_templates,
+    drifts,
+    fine_discrepancy,
+    smooth_discrepancy,
+)
+from mcstudy.errors import UserError
+
+SECOND = 6.0
+"""Log units of evidence that a second cause must add."""
+SINGLES, SECONDS = 30, 12
+"""Forms that are refitted, as a single cause and as a second one."""
+PAIRS = 2
+"""Causes, best first, with which a second one is tried."""
+
+UNEXPLAINED = "unexplained"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a search found.
+
+    Attributes
+    ----------
+    layouts : of the tests. base : fit of the model as it stands.
+    bank, screening : templates of the causes, and whether the base is adequate.
+    candidates : causes by evidence, best first; empty if the base is adequate.
+    remainder : what the best candidate leaves.
+    cause : name, ``unexplained``, or None if adequate. ambiguous : names within reach of the best.
+    second : the second cause with its remainder, or None.
+    best : the fit to extend the model with, or None.
+    why : why the answer is what it is.
+    """
+
+    layouts: tuple[Layout, ...]
+    base: Fit
+    bank: tuple[Template, ...]
+    screening: Screening
+    candidates: tuple[Candidate, ...]
+    remainder: Remainder | None
+    cause: str | None
+    ambiguous: tuple[str, ...]
+    second: Candidate | None
+    second_ambiguous: tuple[str, ...]
+    best: Fit | None
+    why: str
+
+    @property
+    def adequate(self) -> bool:
+        """Whether the base model is adequate."""
+        return self.cause is None
+
+
+def fit_base(problem: Problem) -> tuple[tuple[Layout, ...], Fit]:
+    """Return the layouts of the tests and the fit of the model as it stands.
+
+    Raises
+    ------
+    UserError
+        If the model cannot simulate one of the tests.
+    """
+    layouts = []
+    for test in problem.tests:
+        inputs = dict(test.inputs)
+        inputs |= {u.name: float(u.quantile(0.5)) for u in problem.unknowns}
+        seen = problem.simulate(inputs, {})
+        if seen is None:
+            raise UserError(f"test {test.name!r}: the model fails at its recorded inputs")
+        layouts.append(lay_out(test, seen))
+    found = fit(
+        problem, layouts, (), start_scores(layouts, len(problem.unknowns)), SURVEY
+    )
+    for _ in range(2):
+        scatter = estimate_scatter(found, layouts, smooth_discrepancy(layouts, found))
+        found = fit(problem, layouts, (), rescale(layouts, found, scatter), scatter)
+    return tuple(layouts), found
+
+
+def search(
+    problem: Problem, causes: Sequence[Cause], *, seed: int = 0, workers: int = 1
+) -> Finding:
+    """Return what the simulation gets wrong, if anything, and why.
+
+    Parameters
+    ----------
+    problem : Problem. causes : of the catalogue. seed : of the simulated data sets.
+    workers : processes, -1 for one a core.
+    """
+    rng = np.random.default_rng(seed)
+    layouts, base = fit_base(problem)
+    bank = tuple(cause_templates(problem, layouts, base, all_forms(causes)))
+    screening = screen(
+        base,
+        layouts,
+        bank,
+        drifts(layouts, base, shared_names(problem, ())),
+        smooth_discrepancy(layouts, base),
+        fine_discrepancy(layouts, base),
+        rng,
+    )
+    empty = Finding(
+        layouts, base, bank, screening, (), None, None, (), None, (), None,
+        "the model explains the data within what is uncertain",
+    )  # fmt: skip
+    if screening.p_value > LEVEL:
+        return empty
+    settled = settle(problem, layouts, base)
+    candidates = rank_causes(problem, layouts, settled, causes, workers, SINGLES)
+    return _judge(problem, causes, replace(empty, base=settled), tuple(candidates), workers)
+
+
+def _judge(
+    problem: Problem,
+    causes: Sequence[Cause],
+    empty: Finding,
+    candidates: tuple[Candidate, ...],
+    workers: int,
+) -> Finding:
+    """Return the finding for ranked candidates."""
+    nothing = replace(empty, candidates=candidates, cause=UNEXPLAINED)
+    if not candidates or candidates[0].log_evidence < DISTINCT:
+        return replace(nothing, why="no cause of the catalogue explains the misfit")
+    best = candidates[0]
+    left = examine(problem, empty.layouts, empty.base, best.fitted)
+    drift, evidence = empty.screening.drift
+    if evidence > best.log_evidence + DISTINCT and left.p_value < STRUCTURE:
+        return replace(nothing, remainder=left, why=f"{drift} explains more: a slow change")
+    alone = replace(
+        nothing,
+        remainder=left,
+        cause=best.cause.name,
+        ambiguous=_near(candidates),
+        best=best.fitted,
+        why="one cause explains the misfit",
+    )
+    if left.p_value >= STRUCTURE:
+        return alone
+    pair = _best_pair(problem, causes, empty, candidates, workers)
+    if pair is not None:
+        return replace(
+            alone,
+            cause=pair.first.cause.name,
+            ambiguous=(),
+            remainder=pair.remainder,
+            second=pair.seconds[0],
+            second_ambiguous=_near(pair.seconds),
+            best=pair.seconds[0].fitted,
+            why="two causes explain the misfit together",
+        )
+    if left.share >= MOST_OF_IT:
+        return replace(alone, why="one cause explains most of the misfit; something remains")
+    return replace(nothing, remainder=left, why="the best cause leaves structure behind")
+
+
+def _near(candidates: Sequence[Candidate]) -> tuple[str, ...]:
+    """Return the causes that cannot be told from the best one, nothing if it stands alone."""
+    limit = candidates[0].log_evidence - DISTINCT
+    near = tuple(c.cause.name for c in candidates if c.log_evidence > limit)
+    return near if len(near) > 1 else ()
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """Two causes together: the first, the second ones by evidence, what they leave."""
+
+    first: Candidate
+    seconds: list[Candidate]
+    remainder: Remainder
+
+
+def _best_pair(
+    problem: Problem,
+    causes: Sequence[Cause],
+    empty: Finding,
+    candidates: Sequence[Candidate],
+    workers: int,
+) -> _Pair | None:
+    """Return the pair of causes that explains the misfit, if one does and no single one can."""
+    best: _Pair | None = None
+    for first in candidates[:PAIRS]:
+        seconds = rank_causes(problem, empty.layouts, first.fitted, causes, workers, SECONDS)
+        if not seconds:
+            continue
+        whole = first.fitted.log_evidence + seconds[0].log_evidence
+        if best is not None and whole <= best.first.fitted.log_evidence + best.seconds[0].log_evidence:
+            continue
+        left = examine(problem, empty.layouts, empty.base, seconds[0].fitted)
+        best = _Pair(first, seconds, left)
+    if best is None or best.seconds[0].log_evidence < SECOND:
+        return None
+    return best if best.remainder.p_value >= STRUCTURE else None

@@ -1,0 +1,202 @@
+"""Shapes that a misfit may have: those of the causes, drifts, and shapes that name nothing."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcstudy.diagnosis.fit import Fit, Scores, observe_tests
+from mcstudy.diagnosis.layout import Layout
+from mcstudy.diagnosis.problem import Cause, Form, Problem
+
+Array = NDArray[np.float64]
+
+SMOOTH = 7
+"""Cosines over the pulse of a smooth discrepancy."""
+HIGHEST = 1500.0
+"""Hz up to which a discrepancy that all tests share is looked for (below CFC 1000's corner)."""
+MOST_FINE = 48
+"""Cosines beyond the smooth ones, at most."""
+SIZE = 0.05
+"""A discrepancy's unit, over the peak of the signal or the scalar."""
+DRIFT = 2.0
+"""A drift's unit in scores per standard deviation of what it follows."""
+PULSE_DRIFT = 0.02
+"""The same for the pulse, relative."""
+ONE_PARAMETER = (-2.0, -1.0, -0.3, 0.3, 1.0, 2.0)
+MORE_PARAMETERS = (-2.0, -1.0, 0.0, 1.0, 2.0)
+"""Scores of a cause's parameters at which it is tried."""
+STANDARD_GRID = 3
+"""Free parameters beyond which the further ones stay at their median."""
+
+
+@dataclass(frozen=True)
+class Template:
+    """A cause at one size: its form, the scores of its parameters, and its change of each test.
+
+    ``columns`` are whitened, (n,) a test.
+    """
+
+    form: Form
+    scores: Array
+    columns: tuple[Array, ...]
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """Named columns: (n, k) whitened, a test."""
+
+    names: tuple[str, ...]
+    columns: tuple[Array, ...]
+
+
+def score_grid(form: Form) -> list[Array]:
+    """Return the scores at which a form is tried."""
+    count = len(form.free)
+    if count == 0:
+        return [np.zeros(0)]
+    if count == 1:
+        return [np.array([z]) for z in ONE_PARAMETER]
+    axes = [MORE_PARAMETERS] * min(count, STANDARD_GRID) + [(0.0,)] * (count - STANDARD_GRID)
+    return [np.array(z) for z in np.stack(np.meshgrid(*axes), -1).reshape(-1, count)]
+
+
+def cause_templates(
+    problem: Problem, layouts: Sequence[Layout], fitted: Fit, forms: Sequence[Form]
+) -> list[Template]:
+    """Return the templates of forms, about a fit; those whose runs fail are left out."""
+    plain = [
+        layout.whitened(seen, own)
+        for layout, seen, own in zip(
+            layouts, fitted.observations, fitted.scores.own, strict=True
+        )
+    ]
+    found = []
+    for form in forms:
+        if any(form.cause == other.cause for other in fitted.forms):
+            continue
+        for scores in score_grid(form):
+            columns = _changes(problem, layouts, fitted, form, scores, plain)
+            if columns is not None and any(np.any(column) for column in columns):
+                found.append(Template(form, scores, columns))
+    return found
+
+
+def _changes(
+    problem: Problem,
+    layouts: Sequence[Layout],
+    fitted: Fit,
+    form: Form,
+    scores: Array,
+    plain: Sequence[Array],
+) -> tuple[Array, ...] | None:
+    shared = np.concatenate([fitted.scores.shared, scores])
+    moved = Scores(shared, fitted.scores.own)
+    found = observe_tests(problem, (*fitted.forms, form), layouts, moved)
+    if found is None:
+        return None
+    return tuple(
+        layout.whitened(seen, own) - without
+        for layout, seen, own, without in zip(
+            layouts, found, fitted.scores.own, plain, strict=True
+        )
+    )
+
+
+def covariates_of(layouts: Sequence[Layout]) -> dict[str, Array]:
+    """Return what a slow change may follow, centred and scaled to a standard deviation of one."""
+    found = {}
+    for name in layouts[0].test.covariates:
+        values = np.array([layout.test.covariates[name] for layout in layouts])
+        if np.all(np.isfinite(values)) and values.std() > 0.0:
+            found[name] = (values - values.mean()) / values.std()
+    return found
+
+
+def regimes_of(layouts: Sequence[Layout]) -> dict[str, Array]:
+    """Return the recorded inputs that differ from test to test, centred and scaled."""
+    found = {}
+    for name in layouts[0].test.inputs:
+        values = np.array([layout.test.inputs[name] for layout in layouts])
+        if values.std() > 1e-9 * abs(values.mean()):
+            found[name] = (values - values.mean()) / values.std()
+    return found
+
+
+def drifts(layouts: Sequence[Layout], fitted: Fit, shared: Sequence[str]) -> Shapes:
+    """Return every nuisance and every shared value drifting along every covariate."""
+    names: list[str] = []
+    columns: list[list[Array]] = [[] for _ in layouts]
+    for covariate, factor in covariates_of(layouts).items():
+        for k, name in enumerate(layouts[0].names):
+            scattering = bool(layouts[0].scattering[k])
+            names.append(f"{name} with {covariate}")
+            for i, (layout, slopes) in enumerate(zip(layouts, fitted.own_slopes, strict=True)):
+                unit = DRIFT
+                if scattering:
+                    sizes = layout.scatter_sizes(fitted.scatter)
+                    unit = PULSE_DRIFT / sizes[k - layout.scattering.argmax()]
+                columns[i].append(unit * factor[i] * slopes[:, k])
+        for k, name in enumerate(shared):
+            names.append(f"{name} with {covariate}")
+            for i, slopes in enumerate(fitted.shared_slopes):
+                columns[i].append(0.5 * DRIFT * factor[i] * slopes[:, k])
+    return _stack(names, columns, fitted)
+
+
+def smooth_discrepancy(layouts: Sequence[Layout], fitted: Fit) -> Shapes:
+    """Return the pulse times cosines, times one, the regimes and the covariates."""
+    factors: Mapping[str, Array] = {
+        "all tests": np.ones(len(layouts)),
+        **regimes_of(layouts),
+        **covariates_of(layouts),
+    }
+    return _discrepancy(layouts, fitted, range(SMOOTH), factors, shaped=True)
+
+
+def fine_discrepancy(layouts: Sequence[Layout], fitted: Fit) -> Shapes:
+    """Return the finer cosines, the same in all tests."""
+    length = max(layout.window[1] - layout.window[0] for layout in layouts)
+    last = min(SMOOTH + MOST_FINE, int(2.0 * length * HIGHEST))
+    factors = {"all tests": np.ones(len(layouts))}
+    return _discrepancy(layouts, fitted, range(SMOOTH, last), factors, shaped=False)
+
+
+def _discrepancy(
+    layouts: Sequence[Layout],
+    fitted: Fit,
+    orders: range,
+    factors: Mapping[str, Array],
+    *,
+    shaped: bool,
+) -> Shapes:
+    names = []
+    columns: list[list[Array]] = [[] for _ in layouts]
+    test = layouts[0].test
+    for factor_name, factor in factors.items():
+        for signal in test.signals:
+            for order in orders:
+                names.append(f"{signal.name} cosine {order} x {factor_name}")
+                for i, layout in enumerate(layouts):
+                    seen = fitted.observations[i] if shaped else None
+                    shape = layout.cosine(signal.name, order, seen)
+                    columns[i].append(SIZE * factor[i] * shape)
+        for scalar in test.scalars if shaped else ():
+            names.append(f"{scalar.name} x {factor_name}")
+            for i, layout in enumerate(layouts):
+                columns[i].append(SIZE * factor[i] * layout.unit_scalar(scalar.name))
+    return _stack(names, columns, fitted)
+
+
+def _stack(names: Sequence[str], columns: Sequence[Sequence[Array]], fitted: Fit) -> Shapes:
+    tables = tuple(
+        np.stack(part, axis=1) if part else np.zeros((r.size, 0))
+        for part, r in zip(columns, fitted.residuals, strict=True)
+    )
+    return Shapes(tuple(names), tables)
+
+
+def all_forms(causes: Sequence[Cause]) -> list[Form]:
+    """Return the forms of all causes."""
+    return [form for cause in causes for form in cause.forms]

@@ -1,0 +1,1 @@
+"""Diagnosis of a model against measured tests: ``mcstudy diagnose``."""

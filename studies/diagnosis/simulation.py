@@ -1,0 +1,85 @@
+"""Simulated tests: a model of the registry seen through the channels that were measured."""
+
+from collections.abc import Collection, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcstudy import units
+from mcstudy.diagnosis.problem import Observation, Problem, Scalar, Signal, Test, Unknown
+from mcstudy.diagnosis.noise import estimate_noise
+from mcstudy.errors import UserError
+from mcstudy.measured import Measured
+from models.criteria.filters import filter_cfc
+from models.protocol import Model, complete_status
+from models.registry import load_model
+
+Array = NDArray[np.float64]
+
+FILTERED = {"headform": ("head_acceleration",), "multibody": ("head_acceleration",)}
+"""Channels that a model filters itself."""
+DERIVED = {
+    "head_acceleration": (
+        "hic15",
+        "hic36",
+        "clip_3ms",
+        "clip_3ms_consecutive",
+        "peak_head_acceleration",
+    ),
+    "hood_force": ("peak_force",),
+}
+"""Outputs that follow from a measured channel: no evidence of their own."""
+BIN = 5e-5
+"""s: finer samples of a signal are averaged."""
+
+
+class Simulation:
+    """Runs a model as the tests saw it.
+
+    Parameters
+    ----------
+    name, options : of the model.
+    filters : channel frequency class by signal, 0 for none. scalars : outputs that were measured.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        options: Mapping[str, Any],
+        filters: Mapping[str, float],
+        scalars: Collection[str],
+    ) -> None:
+        self._name, self._options = name, dict(options)
+        self._filters, self._scalars = dict(filters), tuple(scalars)
+        self._models: dict[tuple[str, ...], Model] = {}
+
+    def model(self, effects: Collection[str]) -> Model:
+        """Return the model with effects switched on."""
+        key = tuple(sorted(effects))
+        if key not in self._models:
+            chosen: dict[str, dict[str, float]] = {name: {} for name in key}
+            self._models[key] = load_model(self._name, self._options, chosen)
+        return self._models[key]
+
+    def __call__(
+        self, inputs: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]
+    ) -> Observation | None:
+        """Return a simulated test, or None if the run fails."""
+        model = self.model(effects)
+        values = dict(inputs)
+        for cause, parameters in effects.items():
+            values |= {f"{cause}_{name}": value for name, value in parameters.items()}
+        run = model.observe(values, self._filters, self._scalars)
+        if run.status not in complete_status(model):
+            return None
+        signals = {}
+        for name, channel_class in self._filters.items():
+            group, _, channel = name.partition("_")
+            history = run.histories[group]
+            signal = history.channels[channel]
+            if channel_class > 0.0 and name not in FILTERED[self._name]:
+                rate = 1.0 / float(history.time[1] - history.time[0])
+                signal = filter_cfc(signal, rate, channel_class)
+            signals[name] = (history.time, signal)
+        return Observation(signals, {name: run.outputs[name] for name in self._scalars})

@@ -165,11 +165,27 @@ def _read_folder(folder: Path) -> Measured:
             raise UserError(f"{folder / 'tests.csv'}: column {column!r} is missing")
     if tests.empty:
         raise UserError(f"{folder / 'tests.csv'}: holds no tests")
-    if tests["test"].duplicated().any():
-        raise UserError(f"{folder / 'tests.csv'}: column 'test' repeats an id")
+    lines = tests.index
+    repeated = tests["test"].duplicated()
+    if repeated.any():
+        row = int(np.argmax(repeated))
+        raise UserError(
+            f"{folder / 'tests.csv'}: line {lines[row]}: test {tests['test'].iloc[row]!r} is there "
+            "already"
+        )
     for name in header.inputs:
-        if not np.all(np.isfinite(tests[name])):
-            raise UserError(f"{folder / 'tests.csv'}: column {name!r} must be a number in each row")
+        missing = ~np.isfinite(tests[name].to_numpy())
+        if missing.any():
+            line = lines[int(np.argmax(missing))]
+            raise UserError(f"{folder / 'tests.csv'}: line {line}: column {name!r} must be a number")
+    tests = tests.reset_index(drop=True)
+    for table, entries in (("inputs", header.inputs), ("scalars", header.scalars)):
+        for name, entry in entries.items():
+            _check_unit(place, f"{table}.{name}", entry.unit)
+    for name, signal in header.signals.items():
+        _check_unit(place, f"signals.{name}", signal.unit)
+    for name, distribution in header.uncertain.items():
+        _check_unit(place, f"uncertain.{name}", distribution.unit)
     signals: dict[str, dict[str, Array]] = {}
     for test in tests["test"] if header.signals else ():
         if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,79}", test):
@@ -177,7 +193,11 @@ def _read_folder(folder: Path) -> Measured:
         path = folder / "signals" / f"{test}.csv"
         frame = _read_csv(path)
         if frame.columns[0] != "time":
-            raise UserError(f"{path}: the first column must be 'time' (s)")
+            raise UserError(f"{path}: line 1: the first column must be 'time' (s)")
+        if not any(name in frame.columns for name in header.signals):
+            raise UserError(
+                f"{path}: line 1: none of the signals {', '.join(header.signals)} is a column"
+            )
         signals[test] = {
             name: _series(path, frame, name) for name in header.signals if name in frame.columns
         }
@@ -187,40 +207,68 @@ def _read_folder(folder: Path) -> Measured:
 def _series(path: Path, frame: pd.DataFrame, name: str) -> Array:
     """Return time and values of a column where both are given."""
     table: Array = frame[["time", name]].to_numpy(dtype=float)
-    table = table[np.isfinite(table).all(axis=1)]
+    given = np.isfinite(table).all(axis=1)
+    table = table[given]
     if len(table) < FEWEST_SAMPLES:
-        raise UserError(f"{path}: column {name!r} has only {len(table)} samples")
-    if np.any(np.diff(table[:, 0]) <= 0.0):
-        raise UserError(f"{path}: time must rise")
+        raise UserError(
+            f"{path}: line {frame.index[-1] if len(frame) else 1}: column {name!r} ends after "
+            f"{len(table)} samples, {FEWEST_SAMPLES} are needed"
+        )
+    back = np.diff(table[:, 0]) <= 0.0
+    if back.any():
+        line = frame.index[given][int(np.argmax(back)) + 1]
+        raise UserError(f"{path}: line {line}: time must rise")
     return table
 
 
 def _read_csv(path: Path, text: tuple[str, ...] = ()) -> pd.DataFrame:
-    """Return a table of numbers (NaN where empty) and of the columns that are text."""
+    """Return a table of numbers (NaN where empty) and of the columns that are text.
+
+    Its index holds the lines of the file.
+    """
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = list(csv.reader(file, strict=True))
+            reader = csv.reader(file, strict=True)
+            numbered = [(reader.line_num, row) for row in reader if row]
     except (OSError, ValueError, csv.Error) as error:
         raise UserError(f"{path}: cannot be read ({error})") from None
-    head, *body = rows or [[]]
+    (_, head), *body = numbered or [(1, [])]
     if not head or len(set(head)) < len(head):
-        raise UserError(f"{path}: the first line must name the columns, each once")
-    body = [row for row in body if row]
-    for number, row in enumerate(body, start=2):
+        raise UserError(f"{path}: line 1 must name the columns, each once")
+    lines = [line for line, _ in body]
+    for line, row in body:
         if len(row) != len(head):
-            raise UserError(f"{path}: line {number} has {len(row)} fields, not {len(head)}")
+            raise UserError(f"{path}: line {line} has {len(row)} fields, not {len(head)}")
     columns: dict[str, Any] = {}
-    for name, values in zip(
-        head, zip(*body, strict=True) if body else [()] * len(head), strict=True
-    ):
-        if name in text:
-            columns[name] = values
+    for k, name in enumerate(head):
+        values = [row[k] for _, row in body]
+        columns[name] = values if name in text else _numbers(path, name, values, lines)
+    return pd.DataFrame(columns, index=pd.Index(lines, dtype=np.int64))
+
+
+def _numbers(path: Path, name: str, values: list[str], lines: list[int]) -> Array:
+    """Return a column of numbers, NaN where a field is empty."""
+    column = np.full(len(values), np.nan)
+    for k, value in enumerate(values):
+        if not value.strip():
             continue
         try:
-            columns[name] = np.array([float(v) if v.strip() else np.nan for v in values])
+            column[k] = float(value)
         except ValueError:
-            raise UserError(f"{path}: column {name!r} must hold numbers") from None
-    return pd.DataFrame(columns)
+            column[k] = np.nan
+        if not np.isfinite(column[k]):
+            raise UserError(
+                f"{path}: line {lines[k]}: column {name!r} must hold numbers, not {value[:40]!r}; "
+                "leave a field empty where nothing was measured"
+            )
+    return column
+
+
+def _check_unit(place: Path, key: str, name: str) -> None:
+    """Refuse a unit that no quantity has."""
+    known = units.unit_names()
+    if name not in known:
+        raise UserError(f"{place}: {key}.unit: unknown unit {name!r}: use one of {', '.join(known)}")
 
 
 def _from_isomme(folder: Path, tests: list[isomme.Test]) -> Measured:

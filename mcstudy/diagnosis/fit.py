@@ -139,6 +139,8 @@ def fit(
     start: Scores,
     scatter: Scatter,
     known: Slopes | None = None,
+    *,
+    exact: bool = True,
 ) -> Fit:
     """Return the most probable fit near a start.
 
@@ -147,6 +149,7 @@ def fit(
     Parameters
     ----------
     known : slopes from a fit near by, to begin with.
+    exact : whether the slopes must be those of the most probable scores in the end.
 
     Raises
     ------
@@ -159,25 +162,24 @@ def fit(
     if seen is None:
         raise FitError("a run fails where the fit begins")
     misfit = _misfit(layouts, seen, scores, scatter)
-    slopes = known
+    slopes, fresh = known, False
     for step in range(MOST_STEPS + 1):
-        fresh = slopes is None
         if slopes is None:
-            slopes = _simulate_slopes(problem, forms, layouts, scores, seen, scatter)
+            slopes, fresh = _simulate_slopes(problem, forms, layouts, scores, seen, scatter), True
         residuals, own = _expand(layouts, seen, scores, slopes, scatter)
         system = _System(residuals, own, slopes.shared, scores)
-        if system.expected_gain < CONVERGED or step == MOST_STEPS:
-            break
-        better = _descend(problem, forms, layouts, scores, system, scatter, misfit)
+        better = None
+        if system.expected_gain >= CONVERGED and step < MOST_STEPS:
+            better = _descend(problem, forms, layouts, scores, system, scatter, misfit)
         if better is None:
-            if fresh:
+            if fresh or not exact or step == MOST_STEPS:
                 break
             slopes = None
             continue
         moved, seen, lower = better
         if misfit - lower < LINEAR * system.expected_gain:
             slopes = None
-        scores, misfit = moved, lower
+        scores, misfit, fresh = moved, lower, False
     return Fit(
         forms=forms,
         scatter=scatter,

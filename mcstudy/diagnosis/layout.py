@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from mcstudy.diagnosis.problem import Observation, Test
 
@@ -34,7 +35,8 @@ class Scatter:
 
     Attributes
     ----------
-    level : of the whole pulse and of scalars. shape : of the slowest cosine; the k-th has a k-th.
+    level : of the whole pulse and of scalars.
+    shape : of the slowest cosine; the k-th has 1/k^2 of it, as those of a smooth function do.
     """
 
     level: float
@@ -42,7 +44,7 @@ class Scatter:
 
     def sizes(self, modes: int, scalars: int) -> Array:
         """Return the sizes of modes of the pulse, then of scalars."""
-        waves = [self.shape / k for k in range(1, modes)]
+        waves = [self.shape / k**2 for k in range(1, modes)]
         return np.array([*([self.level] if modes else []), *waves, *[self.level] * scalars])
 
 
@@ -118,6 +120,10 @@ class Layout:
         """Return the simulated vector, whitened, without repeatability."""
         return -self._assemble(seen, np.where(self.scattering, 0.0, scores), NO_SCATTER, measured=False)[0]
 
+    def simulated(self, seen: Observation, scores: Array, scatter: Scatter) -> Array:
+        """Return the simulated vector, whitened, with everything that the scores say."""
+        return -self._assemble(seen, scores, scatter, measured=False)[0]
+
     def cosine(self, signal: str, order: int, seen: Observation | None) -> Array:
         """Return a cosine over the pulse of one signal, whitened (n,).
 
@@ -138,6 +144,31 @@ class Layout:
                     values *= np.interp(channel.time - self.shift, time, shape)
             parts.append(_whiten(values[:, None], channel.sd, channel.correlation)[:, 0])
         return np.concatenate([*parts, np.zeros(len(self.test.scalars))])
+
+    def part(self, signal: str, window: int, windows: int) -> Array:
+        """Return one of equal parts of the pulse, as high as the peak, whitened (n,)."""
+        parts = []
+        begin, end = self.window
+        for channel in self.test.signals:
+            values = np.zeros(channel.time.size)
+            if channel.name == signal:
+                phase = windows * (channel.time - begin) / (end - begin)
+                values[(phase >= window) & (phase < window + 1)] = np.abs(channel.values).max()
+            parts.append(_whiten(values[:, None], channel.sd, channel.correlation)[:, 0])
+        return np.concatenate([*parts, np.zeros(len(self.test.scalars))])
+
+    def unwhiten(self, vector: Array) -> dict[str, Array]:
+        """Return a whitened vector (n,) as signals in their units, by name."""
+        found = {}
+        start = 0
+        for channel in self.test.signals:
+            part = vector[start : start + channel.time.size].copy()
+            if channel.correlation > 0.0:
+                part[1:] *= np.sqrt(1.0 - channel.correlation**2)
+                part = lfilter([1.0], [1.0, -channel.correlation], part)
+            found[channel.name] = channel.sd * part
+            start += channel.time.size
+        return found
 
     def unit_scalar(self, name: str) -> Array:
         """Return a scalar as large as it was measured, alone in the vector, whitened (n,)."""

@@ -17,6 +17,11 @@ from mcstudy.diagnosis.layout import Layout, Scatter
 Array = NDArray[np.float64]
 
 
+FREEDOM = 5.0
+"""Degrees of freedom of a test's repeatability in simulated data (assumed: now and then a test is
+an odd one, more often than normal scatter has it)."""
+
+
 @dataclass(frozen=True)
 class Reduced:
     """Shapes with all nuisances integrated out.
@@ -70,12 +75,16 @@ class Marginal:
         """Return products (count, k) of data sets that the model without shapes makes."""
         common = rng.standard_normal((count, self._shared))
         products = []
-        for gram, scale in zip(self._gram, self._scales(scatter), strict=True):
+        for gram, scale, layout in zip(
+            self._gram, self._scales(scatter), self._layouts, strict=True
+        ):
             values, vectors = np.linalg.eigh(gram)
             root = vectors * np.sqrt(np.maximum(values, 0.0))
             noise = rng.standard_normal((count, values.size)) @ root.T
             q = scale.size
-            own = rng.standard_normal((count, q)) * scale
+            own = rng.standard_normal((count, q))
+            heavy = np.sqrt((FREEDOM - 2.0) / rng.chisquare(FREEDOM, (count, 1)))
+            own = np.where(layout.scattering, own * heavy, own) * scale
             noise += own @ gram[:q] + common @ gram[q : q + self._shared]
             products.append(noise)
         return products

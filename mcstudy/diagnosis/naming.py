@@ -1,5 +1,6 @@
 """Which cause: every one refitted in all its forms, ranked by evidence, with an open set."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -39,14 +40,14 @@ MOST_OF_IT = 0.8
 """Share of the explained misfit from which a cause is named although something remains."""
 SURVEY = Scatter(0.02, 0.02)
 """Repeatability with which forms are tried before it is estimated."""
-ROUNDS = 2
-"""Times that the repeatability is estimated and the fit repeated."""
 UNSEEN = 0.05
 """Sum of squares over the noise below which a form changes nothing that was measured."""
 FARTHEST_START = 4.0
 """Score beyond which no fit begins."""
-CLOSE, WORSE = 30.0, 1.5
+CLOSE, WORSE = 100.0, 2.0
 """Log units and factor by which a form, or a second start, may promise less than the best."""
+FEWEST = 8
+"""Forms that are refitted whatever they promise."""
 APART = 0.9
 """Scores that two starts are apart, at least."""
 
@@ -74,10 +75,12 @@ class Remainder:
 
 def settle(problem: Problem, layouts: Sequence[Layout], fitted: Fit) -> Fit:
     """Return a fit with the repeatability that makes its data most probable."""
-    for _ in range(ROUNDS):
+    for last in (False, True):
         scatter = estimate_scatter(fitted, layouts, None)
         start = rescale(layouts, fitted, scatter)
-        fitted = fit(problem, layouts, fitted.forms, start, scatter, fitted.slopes)
+        fitted = fit(
+            problem, layouts, fitted.forms, start, scatter, fitted.slopes, exact=last
+        )
     return fitted
 
 
@@ -105,7 +108,7 @@ def survey(
     problem: Problem,
     layouts: Sequence[Layout],
     forms: tuple[Form, ...],
-    centre: Centre,
+    centres: Sequence[Centre],
     form: Form,
 ) -> Survey | None:
     """Return how a form does over its prior, the nuisances solved for in the linear model.
@@ -114,11 +117,13 @@ def survey(
 
     Parameters
     ----------
-    forms, centre : the model without the form, linearised. form : the one to add.
+    forms : of the model without the form. centres : where it is linearised: a misfit draws the
+        most probable scores of a wrong model away from those of the right one.
+    form : the one to add.
     """
     tried: list[tuple[float, Scores]] = []
     changes = 0.0
-    for scores in score_grid(form):
+    for centre, scores in itertools.product(centres, score_grid(form)):
         start = Scores(np.concatenate([centre.scores.shared, scores]), centre.scores.own)
         residuals = residuals_at(problem, layouts, (*forms, form), start, SURVEY)
         if residuals is None:
@@ -150,7 +155,7 @@ def fit_form(
     best: Fit | None = None
     for start in surveyed.starts:
         try:
-            found = fit(problem, layouts, (*forms, surveyed.form), start, SURVEY)
+            found = fit(problem, layouts, (*forms, surveyed.form), start, SURVEY, exact=False)
         except FitError:
             continue
         if best is None or found.log_evidence > best.log_evidence:
@@ -179,36 +184,40 @@ def rank_causes(
     shared = base.scores.shared.copy()
     shared[:unknowns] = 0.0
     own = tuple(np.zeros_like(z) for z in base.scores.own)
-    centre = linearise(problem, layouts, base.forms, Scores(shared, own), SURVEY)
-    if centre is None:
-        return []
+    places = (Scores(shared, own), rescale(layouts, base, SURVEY))
+    found = (linearise(problem, layouts, base.forms, place, SURVEY) for place in places)
+    centres = [centre for centre in found if centre is not None]
     taken = {form.cause for form in base.forms}
     forms = [form for c in causes if c.name not in taken for form in c.forms]
     pool = Parallel(n_jobs=workers)
     surveys = pool(
-        delayed(survey)(problem, layouts, base.forms, centre, form) for form in forms
+        delayed(survey)(problem, layouts, base.forms, centres, form) for form in forms
     )
     seen = sorted((s for s in surveys if s is not None), key=lambda s: s.misfits[0])
-    promising = [s for s in seen if s.misfits[0] < WORSE * seen[0].misfits[0] + CLOSE][:most]
+    promising = [
+        s
+        for k, s in enumerate(seen[:most])
+        if k < FEWEST or s.misfits[0] < WORSE * seen[0].misfits[0] + CLOSE
+    ]
     fits = pool(delayed(fit_form)(problem, layouts, base.forms, s) for s in promising)
     candidates = []
     for cause in causes:
-        found = [
+        own_fits = [
             (tried.form, fitted)
             for tried, fitted in zip(promising, fits, strict=True)
             if tried.form.cause == cause.name and fitted is not None
         ]
-        if not found:
+        if not own_fits:
             continue
-        evidence = np.array([fitted.log_evidence for _, fitted in found]) - base.log_evidence
-        form, fitted = found[int(np.argmax(evidence))]
+        evidence = np.array([fitted.log_evidence for _, fitted in own_fits]) - base.log_evidence
+        form, fitted = own_fits[int(np.argmax(evidence))]
         candidates.append(
             Candidate(
                 cause,
                 fitted,
                 form,
                 float(special.logsumexp(evidence) - np.log(evidence.size)),
-                {entry.name: float(v) for (entry, _), v in zip(found, evidence, strict=True)},
+                {entry.name: float(v) for (entry, _), v in zip(own_fits, evidence, strict=True)},
             )
         )
     return sorted(candidates, key=lambda candidate: -candidate.log_evidence)

@@ -33,8 +33,10 @@ NEAR = np.array([0.4, 0.55, 0.75, 1.0, 1.35, 1.8, 2.5])
 """Factors about the repeatability that are tried for simulated data."""
 FREE = 10.0
 """Units of a discrepancy that is left free while the repeatability is estimated."""
-SEEN = 1e-6
+SEEN = 1e-4
 """Share of a shape's sum of squares that the nuisances must leave for it to be seen."""
+FAINTEST = 0.01
+"""Squared standard errors from which it can be."""
 POWER = float(stats.norm.ppf(0.8))
 """Standard errors beyond a threshold at which it is passed with 80 % power."""
 FLIPS = 4000
@@ -78,8 +80,8 @@ class Screening:
 def _errors(marginal: Marginal, information: Array) -> Array:
     """Return the standard errors of scores (m,), infinite for shapes that nuisances swallow."""
     left = np.diag(information)
-    seen = left > np.maximum(SEEN * marginal.squares, SEEN)
-    return np.where(seen, np.sqrt(np.maximum(left, SEEN)), np.inf)
+    seen = left > np.maximum(SEEN * marginal.squares, FAINTEST)
+    return np.where(seen, np.sqrt(np.maximum(left, FAINTEST)), np.inf)
 
 
 def score_templates(

@@ -66,40 +66,30 @@ def cause_templates(
     problem: Problem, layouts: Sequence[Layout], fitted: Fit, forms: Sequence[Form]
 ) -> list[Template]:
     """Return the templates of forms, about a fit; those whose runs fail are left out."""
-    plain = [
-        layout.whitened(seen, own)
-        for layout, seen, own in zip(
-            layouts, fitted.observations, fitted.scores.own, strict=True
-        )
-    ]
+    taken = {form.cause for form in fitted.forms}
     found = []
     for form in forms:
-        if any(form.cause == other.cause for other in fitted.forms):
+        if form.cause in taken:
             continue
         for scores in score_grid(form):
-            columns = _changes(problem, layouts, fitted, form, scores, plain)
+            columns = change_of(problem, layouts, fitted, form, scores)
             if columns is not None and any(np.any(column) for column in columns):
                 found.append(Template(form, scores, columns))
     return found
 
 
-def _changes(
-    problem: Problem,
-    layouts: Sequence[Layout],
-    fitted: Fit,
-    form: Form,
-    scores: Array,
-    plain: Sequence[Array],
+def change_of(
+    problem: Problem, layouts: Sequence[Layout], fitted: Fit, form: Form, scores: Array
 ) -> tuple[Array, ...] | None:
-    shared = np.concatenate([fitted.scores.shared, scores])
-    moved = Scores(shared, fitted.scores.own)
+    """Return what one more form changes of each test about a fit, whitened; None if a run fails."""
+    moved = Scores(np.concatenate([fitted.scores.shared, scores]), fitted.scores.own)
     found = observe_tests(problem, (*fitted.forms, form), layouts, moved)
     if found is None:
         return None
     return tuple(
-        layout.whitened(seen, own) - without
-        for layout, seen, own, without in zip(
-            layouts, found, fitted.scores.own, plain, strict=True
+        layout.whitened(seen, own) - layout.whitened(before, own)
+        for layout, seen, before, own in zip(
+            layouts, found, fitted.observations, fitted.scores.own, strict=True
         )
     )
 

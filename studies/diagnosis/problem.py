@@ -1,44 +1,227 @@
 """Measured data and a model as the problem of a diagnosis."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from mcstudy import units
+from mcstudy.diagnosis.channels import computed_channels
 from mcstudy.diagnosis.noise import estimate_noise
 from mcstudy.diagnosis.problem import Problem, Scalar, Signal, Test, Unknown
 from mcstudy.errors import UserError
-from mcstudy.measured import Measured
+from mcstudy.inputs import Distribution
+from mcstudy.measured import HEADER, Measured
+from models.criteria.units import STANDARD_GRAVITY
 from models.protocol import Model
-from studies.diagnosis.simulation import DERIVED, Simulation
+from studies.diagnosis.simulation import DERIVED, Simulation, channel_units
+
+Array = NDArray[np.float64]
 
 BIN = 5e-5
 """s: finer samples of a signal are averaged."""
+BEFORE = 1e-3
+"""s before the first sizeable sample up to which a signal counts as noise."""
+SIZEABLE = 0.05
+"""Share of the peak from which a sample is sizeable."""
+FEWEST = 3
+"""Tests below which a diagnosis makes no sense."""
 
 
-def build_problem(data: Measured, simulation: Simulation) -> Problem:
-    model = simulation.model(())
+@dataclass(frozen=True)
+class ModelChoice:
+    """The model that is diagnosed: name, options, effects already switched on, fixed inputs."""
+
+    name: str
+    options: Mapping[str, Any]
+    effects: Mapping[str, Mapping[str, float]]
+    fixed: Mapping[str, float]
+
+
+def build_problem(data: Measured, choice: ModelChoice, simulation: Simulation) -> Problem:
+    """Return the problem of measured tests.
+
+    Parameters
+    ----------
+    data : Measured. choice : the model, its values below those that the data state.
+    simulation : of that model.
+
+    Raises
+    ------
+    UserError
+        If the data do not fit the model, or hold a channel that is no evidence of its own.
+    """
+    model, header = simulation.model(()), data.header
+    place = data.source / HEADER
     inputs = {item.name: item for item in model.inputs}
-    header = data.header
-    unknowns = []
-    for name, distribution in header.uncertain.items():
-        scale = units.factor(distribution.unit, inputs[name].unit)
-        unknowns.append(
-            Unknown(name, lambda u, d=distribution, s=scale: s * float(d.quantile(np.array([u]), {})[0]))
+    for table in (header.uncertain, header.inputs):
+        for name in table:
+            if name not in inputs:
+                raise UserError(
+                    f"{place}: model {choice.name!r} has no input {name!r}; it has "
+                    f"{', '.join(inputs)}"
+                )
+    if len(data.tests) < FEWEST:
+        raise UserError(f"{data.source / 'tests.csv'}: a diagnosis takes {FEWEST} tests or more")
+    fixed = {**choice.fixed, **fixed_inputs(data)}
+    noise = _noise_of(data, channel_units(model, list(header.signals)))
+    tests = tuple(
+        _test(data, model, k, fixed, noise) for k in range(len(data.tests))
+    )
+    refused = computed_channels(
+        tests, mass="headform_mass", speed="impact_speed", gravity=STANDARD_GRAVITY
+    )
+    for name, how in refused.items():
+        raise UserError(
+            f"{place}: signals.{name} is {how}: it says nothing that the accelerometer did not "
+            "say; take it out"
         )
-    tests = []
-    fixed = {n: float(v) for n, v in header.fixed.items() if isinstance(v, (int, float))}
-    derived = {o for s in header.signals for o in DERIVED.get(s, ())}
-    for k, name in enumerate(data.tests["test"]):
-        rec, doubt = {}, {}
-        for column in header.inputs:
-            value, sd = data.input_value(column, k, inputs[column].unit)
-            rec[column] = value
-            if sd > 0: doubt[column] = sd
-        signals = []
-        for s, entry in header.signals.items():
-            time, values = data.signal(name, s, {"head_acceleration": "g", "hood_force": "N"}[s])
-            signals.append(Signal(s, time, values, entry.sd, 0.0))
-        scal = [Scalar(s, float(data.tests[s].iloc[k]), e.sd) for s, e in header.scalars.items()]
-        tests.append(Test(name, fixed | rec, doubt, tuple(signals),
-            tuple(x for x in scal if x.name not in derived), tuple(x for x in scal if x.name in derived),
-            {"order": float(k)}))
-    return Problem(tuple(tests), tuple(unknowns), simulation, {n: (i.low, i.high) for n, i in inputs.items()})
+    return Problem(
+        tests=tests,
+        unknowns=tuple(
+            Unknown(name, _quantile_of(place, name, distribution, inputs[name].unit))
+            for name, distribution in header.uncertain.items()
+        ),
+        simulate=simulation,
+        ranges={name: (item.low, item.high) for name, item in inputs.items()},
+    )
+
+
+def fixed_inputs(data: Measured) -> dict[str, float]:
+    """Return the inputs that the data fix for all tests."""
+    return {k: float(v) for k, v in data.header.fixed.items() if isinstance(v, float | int)}
+
+
+def fixed_options(data: Measured) -> dict[str, Any]:
+    """Return the options of the model that the data fix, such as the hood's curve."""
+    return {k: v for k, v in data.header.fixed.items() if isinstance(v, list)}
+
+
+def _quantile_of(place: Any, name: str, distribution: Distribution, unit: str) -> Any:
+    if distribution.parents:
+        raise UserError(f"{place}: uncertain.{name} may not depend on another input")
+    try:
+        scale = units.factor(distribution.unit, unit)
+    except ValueError as error:
+        raise UserError(f"{place}: uncertain.{name}.unit: {error}") from None
+    return partial(_quantile, distribution, scale)
+
+
+def _quantile(distribution: Distribution, scale: float, probability: float) -> float:
+    return scale * float(distribution.quantile(np.array([probability]), {})[0])
+
+
+@dataclass(frozen=True)
+class _Channel:
+    """Unit in the model, standard deviation and correlation of the noise of a signal."""
+
+    unit: str
+    sd: float
+    correlation: float
+
+
+def _noise_of(data: Measured, names: Mapping[str, str]) -> dict[str, _Channel]:
+    found = {}
+    place = data.source / HEADER
+    for name, entry in data.header.signals.items():
+        if name not in names:
+            raise UserError(f"{place}: signals.{name}: the model has no such channel")
+        unit = names[name]
+        series = [_thinned(*data.signal(test, name, unit)) for test in data.tests["test"]]
+        scale = units.factor(entry.unit, unit)
+        shrink = np.sqrt(_bin_size(data.signal(data.tests["test"].iloc[0], name, unit)[0]))
+        try:
+            noise = estimate_noise([_lead_in(*s) for s in series], entry.sd * scale / shrink)
+        except ValueError as error:
+            raise UserError(f"{place}: signals.{name}: {error}") from None
+        found[name] = _Channel(unit, noise.sd, noise.correlation)
+    return found
+
+
+def _bin_size(time: Array) -> int:
+    return max(1, int(BIN / float(np.median(np.diff(time))) + 1e-6))
+
+
+def _thinned(time: Array, values: Array) -> tuple[Array, Array]:
+    """Return a signal averaged over bins, if it is finer than them."""
+    size = _bin_size(time)
+    if size == 1:
+        return time, values
+    count = time.size // size
+    parts = (x[: count * size].reshape(count, size).mean(axis=1) for x in (time, values))
+    return tuple(parts)  # type: ignore[return-value]
+
+
+def _lead_in(time: Array, values: Array) -> Array:
+    """Return the samples before contact."""
+    first = int(np.argmax(np.abs(values) >= SIZEABLE * np.abs(values).max()))
+    return values[time < time[first] - BEFORE]
+
+
+def _test(
+    data: Measured, model: Model, row: int, fixed: Mapping[str, float], noise: Mapping[str, _Channel]
+) -> Test:
+    header = data.header
+    name = str(data.tests["test"].iloc[row])
+    known = {item.name: item for item in model.inputs}
+    inputs, doubtful = dict(fixed), {}
+    for column in header.inputs:
+        found = data.input_value(column, row, known[column].unit)
+        assert found is not None
+        item = known[column]
+        if not item.low <= found[0] <= item.high:
+            raise UserError(
+                f"{data.source / 'tests.csv'}: test {name!r}: {column} = {found[0]:g} {item.unit} "
+                f"is outside {item.low:g} to {item.high:g} {item.unit}"
+            )
+        inputs[column] = found[0]
+        if found[1] > 0.0:
+            doubtful[column] = found[1]
+    signals = []
+    for channel, entry in noise.items():
+        time, values = _thinned(*data.signal(name, channel, entry.unit))
+        signals.append(Signal(channel, time, values, entry.sd, entry.correlation))
+    derived = {output for channel in header.signals for output in DERIVED.get(channel, ())}
+    scalars, judged = [], []
+    for scalar in _scalars(data, model, row):
+        if scalar.name in derived:
+            judged.append(scalar)
+        else:
+            scalars.append(scalar)
+    return Test(
+        name, inputs, doubtful, tuple(signals), tuple(scalars), tuple(judged),
+        {"order": float(row)} | _covariates(data, row),
+    )  # fmt: skip
+
+
+def _scalars(data: Measured, model: Model, row: int) -> list[Scalar]:
+    place = data.source / HEADER
+    outputs = {item.name: item.unit for item in model.outputs}
+    found = []
+    for name, entry in data.header.scalars.items():
+        if name not in outputs:
+            raise UserError(f"{place}: scalars.{name}: the model has no such output")
+        try:
+            scale = units.factor(entry.unit, outputs[name])
+        except ValueError as error:
+            raise UserError(f"{place}: scalars.{name}.unit: {error}") from None
+        if entry.sd == 0.0:
+            raise UserError(f"{place}: scalars.{name}: state its standard uncertainty sd")
+        value = float(data.tests[name].iloc[row]) * scale
+        # What was not measured has no weight.
+        missing = not np.isfinite(value)
+        found.append(Scalar(name, 0.0 if missing else value, np.inf if missing else entry.sd * scale))
+    return found
+
+
+def _covariates(data: Measured, row: int) -> dict[str, float]:
+    """Return the columns of the table that are neither inputs nor scalars."""
+    taken = {"test", *data.header.inputs, *data.header.scalars}
+    return {
+        str(column): float(data.tests[column].iloc[row])
+        for column in data.tests.columns
+        if column not in taken
+    }

@@ -3,19 +3,10 @@
 from collections.abc import Collection, Mapping
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from mcstudy import units
-from mcstudy.diagnosis.problem import Observation, Problem, Scalar, Signal, Test, Unknown
-from mcstudy.diagnosis.noise import estimate_noise
-from mcstudy.errors import UserError
-from mcstudy.measured import Measured
+from mcstudy.diagnosis.problem import Observation
 from models.criteria.filters import filter_cfc
 from models.protocol import Model, complete_status
 from models.registry import load_model
-
-Array = NDArray[np.float64]
 
 FILTERED = {"headform": ("head_acceleration",), "multibody": ("head_acceleration",)}
 """Channels that a model filters itself."""
@@ -30,8 +21,17 @@ DERIVED = {
     "hood_force": ("peak_force",),
 }
 """Outputs that follow from a measured channel: no evidence of their own."""
-BIN = 5e-5
-"""s: finer samples of a signal are averaged."""
+
+def channel_units(model: Model, names: Collection[str]) -> dict[str, str]:
+    """Return the units of channels ``<group>_<channel>`` of a model's histories."""
+    if not names:
+        return {}
+    run = model.run({})
+    return {
+        f"{group}_{channel}": unit
+        for group, history in run.histories.items()
+        for channel, unit in history.units.items()
+    }
 
 
 class Simulation:
@@ -41,6 +41,7 @@ class Simulation:
     ----------
     name, options : of the model.
     filters : channel frequency class by signal, 0 for none. scalars : outputs that were measured.
+    effects : switched on from the start.
     """
 
     def __init__(
@@ -49,16 +50,18 @@ class Simulation:
         options: Mapping[str, Any],
         filters: Mapping[str, float],
         scalars: Collection[str],
+        effects: Mapping[str, Mapping[str, float]] | None = None,
     ) -> None:
         self._name, self._options = name, dict(options)
         self._filters, self._scalars = dict(filters), tuple(scalars)
+        self._effects = {k: dict(v) for k, v in (effects or {}).items()}
         self._models: dict[tuple[str, ...], Model] = {}
 
     def model(self, effects: Collection[str]) -> Model:
         """Return the model with effects switched on."""
         key = tuple(sorted(effects))
         if key not in self._models:
-            chosen: dict[str, dict[str, float]] = {name: {} for name in key}
+            chosen = self._effects | {name: {} for name in key}
             self._models[key] = load_model(self._name, self._options, chosen)
         return self._models[key]
 

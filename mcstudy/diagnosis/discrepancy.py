@@ -1,0 +1,138 @@
+"""A Gaussian process for what a model misses: the baseline that names nothing.
+
+The discrepancy of a test is a sum of smooth shapes; the coefficient of each is a Gaussian process
+over the recorded inputs. Size and length are those that make the data most probable.
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcstudy.diagnosis.fit import Fit
+from mcstudy.diagnosis.layout import Layout
+from mcstudy.diagnosis.marginal import Marginal
+from mcstudy.diagnosis.templates import Shapes, smooth_discrepancy
+
+Array = NDArray[np.float64]
+
+SIZES = (0.03, 0.1, 0.3, 1.0, 3.0)
+"""Standard deviations of a coefficient that are tried (1 is a twentieth of the pulse)."""
+LENGTHS = (0.5, 1.0, 2.0, 5.0)
+"""Lengths, in standard deviations of the inputs, that are tried."""
+JITTER = 1e-8
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """A fitted process.
+
+    Attributes
+    ----------
+    centre, scale : of the recorded inputs, by name. points : (tests, inputs) scaled.
+    size, length : of the kernel. weights : (tests * shapes,) of the posterior mean.
+    covariance : (tests * shapes, tests * shapes), posterior of the coefficients.
+    shapes : number of shapes a test.
+    """
+
+    names: tuple[str, ...]
+    centre: Array
+    scale: Array
+    points: Array
+    size: float
+    length: float
+    mean: Array
+    covariance: Array
+    shapes: int
+
+    def shapes_of(self, layouts: Sequence[Layout], fitted: Fit) -> tuple[Array, ...]:
+        """Return the shapes (n, k) of every test of a fit, whitened."""
+        return _plain(smooth_discrepancy(layouts, fitted)).columns
+
+    def predict(self, layouts: Sequence[Layout]) -> tuple[list[Array], list[Array]]:
+        """Return mean (k,) and root (k, k) of the covariance of the coefficients, a test."""
+        kernel = _kernel(self.points, self.points, self.size, self.length)
+        kernel += JITTER * self.size**2 * np.eye(len(kernel))
+        inverse = np.linalg.inv(kernel)
+        means, roots = [], []
+        coefficients = self.mean.reshape(len(self.points), self.shapes)
+        for layout in layouts:
+            point = (_inputs(layout, self.names) - self.centre) / self.scale
+            cross = _kernel(point[None], self.points, self.size, self.length)[0]
+            weight = cross @ inverse
+            means.append(weight @ coefficients)
+            left = max(self.size**2 - float(weight @ cross), 0.0)
+            blocks = self.covariance.reshape(
+                len(self.points), self.shapes, len(self.points), self.shapes
+            )
+            spread = np.einsum("i,iajb,j->ab", weight, blocks, weight)
+            values, vectors = np.linalg.eigh(spread + left * np.eye(self.shapes))
+            roots.append(vectors * np.sqrt(np.maximum(values, 0.0)))
+        return means, roots
+
+
+def fit_discrepancy(fitted: Fit, layouts: Sequence[Layout], shapes: Shapes) -> Discrepancy:
+    """Return the process that makes the tests of a fit most probable.
+
+    Parameters
+    ----------
+    fitted : Fit of the base model. layouts : of its tests.
+    shapes : smooth shapes; those that are the same in all tests are taken.
+    """
+    plain = _plain(shapes)
+    count = len(plain.names)
+    names = tuple(layouts[0].test.inputs)
+    table = np.array([_inputs(layout, names) for layout in layouts])
+    moving = table.std(axis=0) > 1e-9 * np.abs(table.mean(axis=0))
+    names = tuple(np.array(names)[moving].tolist())
+    centre, scale = table[:, moving].mean(axis=0), table[:, moving].std(axis=0)
+    points = (table[:, moving] - centre) / scale
+    information, score = _per_test(fitted, layouts, plain, count)
+    best: tuple[float, float, float, Array, Array] | None = None
+    for size, length in itertools.product(SIZES, LENGTHS):
+        kernel = _kernel(points, points, size, length)
+        kernel += JITTER * size**2 * np.eye(len(points))
+        prior = np.kron(np.linalg.inv(kernel), np.eye(count))
+        precision = prior + information
+        covariance = np.linalg.inv(precision)
+        mean = covariance @ score
+        likelihood = 0.5 * float(score @ mean)
+        likelihood += 0.5 * float(np.linalg.slogdet(prior)[1] - np.linalg.slogdet(precision)[1])
+        if best is None or likelihood > best[0]:
+            best = (likelihood, size, length, mean, covariance)
+    assert best is not None
+    return Discrepancy(names, centre, scale, points, best[1], best[2], best[3], best[4], count)
+
+
+def _plain(shapes: Shapes) -> Shapes:
+    """Return the shapes that are not multiplied by a regime or covariate."""
+    kept = [k for k, name in enumerate(shapes.names) if name.endswith("all tests")]
+    return Shapes(
+        tuple(shapes.names[k] for k in kept), tuple(table[:, kept] for table in shapes.columns)
+    )
+
+
+def _per_test(
+    fitted: Fit, layouts: Sequence[Layout], plain: Shapes, count: int
+) -> tuple[Array, Array]:
+    """Return information and score of a coefficient for each shape and test."""
+    tests = len(layouts)
+    columns = []
+    for i, table in enumerate(plain.columns):
+        wide = np.zeros((table.shape[0], tests * count))
+        wide[:, i * count : (i + 1) * count] = table
+        columns.append(wide)
+    marginal = Marginal(fitted, layouts, columns)
+    reduced = marginal.reduce(marginal.measured(), fitted.scatter)
+    return reduced.information, reduced.score[0]
+
+
+def _inputs(layout: Layout, names: Sequence[str]) -> Array:
+    return np.array([layout.test.inputs[name] for name in names])
+
+
+def _kernel(first: Array, second: Array, size: float, length: float) -> Array:
+    square = np.sum((first[:, None] - second[None]) ** 2, axis=2)
+    return np.asarray(size**2 * np.exp(-0.5 * square / length**2))

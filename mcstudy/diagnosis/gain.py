@@ -1,0 +1,293 @@
+"""What an extended model gains on tests that it has not seen.
+
+Whole tests are held out, never samples of them. Three predictions are scored: the base model, the
+extended one, and the base model with a Gaussian-process discrepancy, which fits a misfit and names
+nothing (M. Kennedy, A. O'Hagan, J. R. Stat. Soc. B 63:425, 2001).
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcstudy.diagnosis.discrepancy import Discrepancy, fit_discrepancy
+from mcstudy.diagnosis.fit import Fit, FitError, Scores, Slopes, fit, observe_tests
+from mcstudy.diagnosis.layout import Layout
+from mcstudy.diagnosis.problem import Problem
+from mcstudy.diagnosis.templates import smooth_discrepancy
+from mcstudy.statistics import Estimate
+
+Array = NDArray[np.float64]
+Quantity = Callable[[Array, Array], float]
+"""Time (s) and values of a signal to a number, such as HIC15."""
+
+FOLDS = 6
+DRAWS = 200
+RESAMPLES = 2000
+BEYOND = 0.25
+"""Share of the tests, those at the top of the regime, that are held out together."""
+MODELS = ("base", "extended", "gaussian_process")
+
+
+@dataclass(frozen=True)
+class Gain:
+    """A score of the three predictions; smaller is better for all but the log score.
+
+    Attributes
+    ----------
+    score : its name. region : ``inside`` or ``beyond`` the regime of the tests that were used.
+    unit : of the score. base, extended, gaussian_process : means over the held-out tests.
+    difference : extended against base, positive if better, with its interval.
+    against_process : the same against the Gaussian process.
+    """
+
+    score: str
+    region: str
+    unit: str
+    base: float
+    extended: float
+    gaussian_process: float
+    difference: Estimate
+    against_process: Estimate
+
+
+@dataclass(frozen=True)
+class _Prediction:
+    """Of one test, whitened: mean (n,) and factor (n, k) of the covariance beside the noise."""
+
+    mean: Array
+    factor: Array
+
+
+def measure_gain(
+    problem: Problem,
+    layouts: Sequence[Layout],
+    base: Fit,
+    extended: Fit,
+    quantities: Mapping[str, tuple[str, str, Quantity]],
+    seed: int,
+) -> list[Gain]:
+    """Return the scores of held-out tests, inside the tested regime and beyond it.
+
+    Parameters
+    ----------
+    base, extended : fits to all tests.
+    quantities : unit, signal and function by name.
+    seed : of the draws.
+    """
+    rng = np.random.default_rng(seed)
+    count = len(layouts)
+    order = rng.permutation(count)
+    folds = [order[k :: min(FOLDS, count)] for k in range(min(FOLDS, count))]
+    found = _score(problem, layouts, base, extended, quantities, folds, rng)
+    gains = _compare(found, "inside", quantities, rng)
+    top = _top(layouts)
+    if top.size:
+        found = _score(problem, layouts, base, extended, quantities, [top], rng)
+        gains += _compare(found, "beyond", quantities, rng)
+    return gains
+
+
+def _top(layouts: Sequence[Layout]) -> NDArray[np.int64]:
+    """Return the tests at the top of the impact speed, if it differs."""
+    speeds = np.array([layout.test.inputs.get("impact_speed", 0.0) for layout in layouts])
+    size = round(BEYOND * speeds.size)
+    if np.ptp(speeds) == 0.0 or size < 2:
+        return np.zeros(0, dtype=np.int64)
+    return np.argsort(speeds)[-size:]
+
+
+Scored = dict[str, dict[str, list[float]]]
+"""By score and model the values of the held-out tests."""
+
+
+def _score(
+    problem: Problem,
+    layouts: Sequence[Layout],
+    base: Fit,
+    extended: Fit,
+    quantities: Mapping[str, tuple[str, str, Quantity]],
+    folds: Sequence[NDArray[np.int64]],
+    rng: np.random.Generator,
+) -> Scored:
+    scored: Scored = {}
+    for held in folds:
+        kept = np.setdiff1d(np.arange(len(layouts)), held)
+        try:
+            trained = {
+                "base": _train(problem, layouts, base, kept),
+                "extended": _train(problem, layouts, extended, kept),
+            }
+        except FitError:
+            continue
+        part = [layouts[i] for i in kept]
+        process = fit_discrepancy(trained["base"], part, smooth_discrepancy(part, trained["base"]))
+        # The same noise for all three, so that their differences are not of the draws.
+        seeds = rng.integers(2**32, size=held.size)
+        for name in MODELS:
+            fitted = trained["base" if name == "gaussian_process" else name]
+            whole = base if name == "gaussian_process" else {"base": base, "extended": extended}[name]
+            predicted = _predict(problem, layouts, fitted, whole, held)
+            if predicted is None:
+                continue
+            if name == "gaussian_process":
+                predicted = _corrected(layouts, base, held, predicted, process)
+            for i, prediction, seed in zip(held, predicted, seeds, strict=True):
+                own = np.random.default_rng(seed)
+                for key, value in _judge(layouts[i], base, i, prediction, quantities, own).items():
+                    scored.setdefault(key, {}).setdefault(name, []).append(value)
+    return scored
+
+
+def _train(problem: Problem, layouts: Sequence[Layout], whole: Fit, kept: Array) -> Fit:
+    """Return a fit to some of the tests, from that to all."""
+    part = replace(problem, tests=tuple(problem.tests[i] for i in kept))
+    slopes = Slopes(
+        tuple(whole.slopes.doubtful[i] for i in kept), tuple(whole.slopes.shared[i] for i in kept)
+    )
+    scores = Scores(whole.scores.shared, tuple(whole.scores.own[i] for i in kept))
+    places = [layouts[i] for i in kept]
+    return fit(part, places, whole.forms, scores, whole.scatter, slopes, exact=False)
+
+
+def _predict(
+    problem: Problem,
+    layouts: Sequence[Layout],
+    trained: Fit,
+    whole: Fit,
+    held: Sequence[int] | NDArray[np.int64],
+) -> list[_Prediction] | None:
+    """Return predictions of held-out tests, their own nuisances unknown."""
+    places = [layouts[i] for i in held]
+    own = tuple(np.zeros(len(place.names)) for place in places)
+    seen = observe_tests(problem, trained.forms, places, Scores(trained.scores.shared, own))
+    if seen is None:
+        return None
+    root = np.linalg.cholesky(trained.covariance) if trained.covariance.size else np.zeros((0, 0))
+    return [
+        _Prediction(
+            place.whitened(observation, zero),
+            np.concatenate([whole.own_slopes[i], whole.shared_slopes[i] @ root], axis=1),
+        )
+        for i, place, observation, zero in zip(held, places, seen, own, strict=True)
+    ]
+
+
+def _corrected(
+    layouts: Sequence[Layout],
+    base: Fit,
+    held: NDArray[np.int64],
+    predicted: Sequence[_Prediction],
+    process: Discrepancy,
+) -> list[_Prediction]:
+    """Return predictions with the Gaussian process added."""
+    places = [layouts[i] for i in held]
+    shapes = process.shapes_of(layouts, base)
+    means, roots = process.predict(places)
+    return [
+        _Prediction(
+            prediction.mean + shapes[i] @ mean,
+            np.concatenate([prediction.factor, shapes[i] @ root], axis=1),
+        )
+        for i, prediction, mean, root in zip(held, predicted, means, roots, strict=True)
+    ]
+
+
+def _judge(
+    layout: Layout,
+    base: Fit,
+    row: int,
+    prediction: _Prediction,
+    quantities: Mapping[str, tuple[str, str, Quantity]],
+    rng: np.random.Generator,
+) -> dict[str, float]:
+    """Return the scores of one prediction of one test."""
+    own = base.scores.own[row]
+    measured = base.residuals[row] + layout.simulated(base.observations[row], own, base.scatter)
+    off = measured - prediction.mean
+    found = {"log_score": _log_density(off, prediction.factor)}
+    noise = rng.standard_normal((DRAWS, off.size))
+    spread = rng.standard_normal((DRAWS, prediction.factor.shape[1])) @ prediction.factor.T
+    draws = prediction.mean + spread + noise
+    if layout.test.signals:
+        for signal, part in layout.unwhiten(off).items():
+            inside = (layout.window[0] <= _time(layout, signal)) & (
+                _time(layout, signal) <= layout.window[1]
+            )
+            found[f"rmse_{signal}"] = float(np.sqrt(np.mean(part[inside] ** 2)))
+        truth = layout.unwhiten(measured)
+        pictures = [layout.unwhiten(draw) for draw in draws]
+        for name, (_, signal, quantity) in quantities.items():
+            time = _time(layout, signal)
+            values = np.array([quantity(time, picture[signal]) for picture in pictures])
+            target = quantity(time, truth[signal])
+            found[f"crps_{name}"] = _crps(values, target)
+            found[f"rmse_{name}"] = float(abs(np.median(values) - target))
+    first = off.size - len(layout.test.scalars)
+    for k, scalar in enumerate(layout.test.scalars):
+        if np.isfinite(scalar.sd):
+            values = draws[:, first + k] * scalar.sd
+            found[f"crps_{scalar.name}"] = _crps(values, scalar.value)
+            found[f"rmse_{scalar.name}"] = float(abs(off[first + k]) * scalar.sd)
+    return found
+
+
+def _time(layout: Layout, signal: str) -> Array:
+    return next(s.time for s in layout.test.signals if s.name == signal)
+
+
+def _log_density(off: Array, factor: Array) -> float:
+    """Return the log density of N(0, I + F F^T), without its constant."""
+    block = np.eye(factor.shape[1]) + factor.T @ factor
+    pull = factor.T @ off
+    quadratic = float(off @ off - pull @ np.linalg.solve(block, pull))
+    return -0.5 * (quadratic + float(np.linalg.slogdet(block)[1]))
+
+
+def _crps(draws: Array, target: float) -> float:
+    """Return the continuous ranked probability score of a sample (T. Gneiting, A. Raftery, 2007)."""
+    ordered = np.sort(draws)
+    n = ordered.size
+    spread = float(np.sum((2.0 * np.arange(1, n + 1) - n - 1.0) * ordered)) / n**2
+    return float(np.mean(np.abs(ordered - target)) - spread)
+
+
+def _compare(
+    scored: Scored,
+    region: str,
+    quantities: Mapping[str, tuple[str, str, Quantity]],
+    rng: np.random.Generator,
+) -> list[Gain]:
+    gains = []
+    for score, by_model in scored.items():
+        if set(by_model) != set(MODELS):
+            continue
+        tables = {name: np.array(values) for name, values in by_model.items()}
+        count = min(table.size for table in tables.values())
+        rows = rng.integers(count, size=(RESAMPLES, count))
+        square = score.startswith("rmse")
+        sign = 1.0 if score == "log_score" else -1.0
+
+        def mean(values: Array, square: bool = square) -> Array:
+            return np.sqrt(np.mean(values**2, -1)) if square else np.mean(values, -1)
+
+        def estimate(other: str) -> Estimate:
+            ours, theirs = tables["extended"], tables[other]
+            value = sign * float(mean(ours) - mean(theirs))
+            spread = sign * (mean(ours[rows]) - mean(theirs[rows]))
+            low, high = np.quantile(spread, [0.025, 0.975])
+            return Estimate(value, float(low), float(high))
+
+        name = score.partition("_")[2]
+        gains.append(
+            Gain(
+                score,
+                region,
+                quantities[name][0] if name in quantities else "",
+                *(float(mean(tables[model])) for model in MODELS),
+                estimate("base"),
+                estimate("gaussian_process"),
+            )
+        )
+    return gains

@@ -172,20 +172,64 @@ def risk_curve(
 
 
 @app.command()
+def diagnose(
+    data: Annotated[
+        Path,
+        typer.Argument(help="Folder of measured data or of ISO-MME tests.", show_default=False),
+    ],
+    model_config: Annotated[
+        Path | None, typer.Option(help="Study file whose model is diagnosed.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the simulated data sets.")] = 0,
+    out: Out = None,
+    workers: Workers = -1,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Tell what a simulation gets wrong against measured tests, why, and what a cure gains."""
+    from mcstudy.results import ResultsFolder
+    from studies.diagnosis import report as diagnosis_report
+    from studies.diagnosis import study as diagnosis
+
+    folder = ResultsFolder(out or Path("results") / f"diagnosis_{data.resolve().name}")
+    answer = diagnosis.diagnose(
+        data, folder, model_config=model_config, seed=seed, workers=workers,
+        quiet=quiet or as_json,
+    )  # fmt: skip
+    summary = [*diagnosis_report.summarise(answer), *diagnosis_report.table_of(answer)]
+    _print_analysis(answer, summary, folder.path, quiet=quiet, as_json=as_json)
+
+
+@app.command()
 def validate(
     out: Out = None,
     measured: Annotated[
         Path, typer.Option(help="Folder of real measurements; left out where it is missing.")
     ] = Path("../shared/measured"),
     only: Annotated[list[str] | None, typer.Option(help="One part; may be repeated.")] = None,
+    diagnosis: Annotated[
+        bool, typer.Option("--diagnosis", help="Hide effects in data and count what is found.")
+    ] = False,
+    sets: Annotated[int, typer.Option(min=20, help="Sets of tests with --diagnosis, about.")] = 300,
     workers: Workers = -1,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Run the models against closed forms, published numbers and measurements."""
+    """Run the models against closed forms, published numbers and measurements.
+
+    With --diagnosis: hide effects in data, diagnose them, and print how often the truth was found.
+    """
     from mcstudy.results import ResultsFolder
     from studies.validation import report
+    from studies.validation.diagnosis import tier
 
+    if diagnosis:
+        target = ResultsFolder(out or Path("results/validation_diagnosis"))
+        found = tier.validate_diagnosis(target, sets=sets, workers=workers, quiet=quiet or as_json)
+        _print_analysis(found, tier.summarise(found), target.path, quiet=quiet, as_json=as_json)
+        if missed := tier.failed(found):
+            raise StudyError(f"targets missed: {'; '.join(missed)}")
+        return
     folder = ResultsFolder(out or Path("results/validation"))
     analysis = report.validate(
         folder, measured=measured, only=only or (), workers=workers, quiet=quiet or as_json

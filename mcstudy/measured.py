@@ -177,11 +177,14 @@ def _read_folder(folder: Path) -> Measured:
         missing = ~np.isfinite(tests[name].to_numpy())
         if missing.any():
             line = lines[int(np.argmax(missing))]
-            raise UserError(f"{folder / 'tests.csv'}: line {line}: column {name!r} must be a number")
+            raise UserError(
+                f"{folder / 'tests.csv'}: line {line}: column {name!r} must be a number"
+            )
     tests = tests.reset_index(drop=True)
-    for table, entries in (("inputs", header.inputs), ("scalars", header.scalars)):
-        for name, entry in entries.items():
-            _check_unit(place, f"{table}.{name}", entry.unit)
+    for name, entry in header.inputs.items():
+        _check_unit(place, f"inputs.{name}", entry.unit)
+    for name, entry in header.scalars.items():
+        _check_unit(place, f"scalars.{name}", entry.unit)
     for name, signal in header.signals.items():
         _check_unit(place, f"signals.{name}", signal.unit)
     for name, distribution in header.uncertain.items():
@@ -207,7 +210,7 @@ def _read_folder(folder: Path) -> Measured:
 def _series(path: Path, frame: pd.DataFrame, name: str) -> Array:
     """Return time and values of a column where both are given."""
     table: Array = frame[["time", name]].to_numpy(dtype=float)
-    given = np.isfinite(table).all(axis=1)
+    given = np.flatnonzero(np.isfinite(table).all(axis=1))
     table = table[given]
     if len(table) < FEWEST_SAMPLES:
         raise UserError(
@@ -216,7 +219,7 @@ def _series(path: Path, frame: pd.DataFrame, name: str) -> Array:
         )
     back = np.diff(table[:, 0]) <= 0.0
     if back.any():
-        line = frame.index[given][int(np.argmax(back)) + 1]
+        line = frame.index[given[int(np.argmax(back)) + 1]]
         raise UserError(f"{path}: line {line}: time must rise")
     return table
 
@@ -268,7 +271,9 @@ def _check_unit(place: Path, key: str, name: str) -> None:
     """Refuse a unit that no quantity has."""
     known = units.unit_names()
     if name not in known:
-        raise UserError(f"{place}: {key}.unit: unknown unit {name!r}: use one of {', '.join(known)}")
+        raise UserError(
+            f"{place}: {key}.unit: unknown unit {name!r}: use one of {', '.join(known)}"
+        )
 
 
 def _from_isomme(folder: Path, tests: list[isomme.Test]) -> Measured:

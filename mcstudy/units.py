@@ -28,6 +28,8 @@ _UNITS: dict[str, tuple[str, float]] = {
     "kN": ("force", 1000.0),
     "J": ("energy", 1.0),
     "N s/m": ("damping", 1.0),
+    "N/m": ("stiffness", 1.0),
+    "m/N": ("compliance", 1.0),
 }
 
 

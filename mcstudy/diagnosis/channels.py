@@ -43,9 +43,10 @@ def computed_channels(
         if name.endswith("_force"):
             if all(_is_mass_times(a, f, test.inputs[mass], gravity) for test, a, f in pairs):
                 found[name] = "mass times the head acceleration"
-        elif name.endswith("_penetration") and all(speed in test.inputs for test, _, _ in pairs):
-            if all(_is_integral(a, x, test.inputs[speed], gravity) for test, a, x in pairs):
-                found[name] = "the double integral of the head acceleration"
+        elif name.endswith("_penetration") and all(
+            _is_integral(a, x, test.inputs.get(speed, 0.0), gravity) for test, a, x in pairs
+        ):
+            found[name] = "the double integral of the head acceleration"
     return found
 
 
@@ -61,8 +62,8 @@ def _is_mass_times(acceleration: Signal, force: Signal, mass: float, gravity: fl
 
 def _is_integral(acceleration: Signal, depth: Signal, speed: float, gravity: float) -> bool:
     time = acceleration.time
-    rate = -gravity * cumulative_trapezoid(acceleration.values, time, initial=0.0)
-    way = cumulative_trapezoid(rate, time, initial=0.0)
+    rate = -gravity * cumulative_trapezoid(acceleration.values, time, initial=0)
+    way = cumulative_trapezoid(rate, time, initial=0)
     twin = np.interp(depth.time, time, way)
     inside = depth.values > 0.05 * depth.values.max()
     # Where integration began and the speed that it took are a straight line.

@@ -96,7 +96,7 @@ def fit_discrepancy(fitted: Fit, layouts: Sequence[Layout], shapes: Shapes) -> D
         kernel += JITTER * size**2 * np.eye(len(points))
         prior = np.kron(np.linalg.inv(kernel), np.eye(count))
         precision = prior + information
-        covariance = np.linalg.inv(precision)
+        covariance = np.asarray(np.linalg.inv(precision))
         mean = covariance @ score
         likelihood = 0.5 * float(score @ mean)
         likelihood += 0.5 * float(np.linalg.slogdet(prior)[1] - np.linalg.slogdet(precision)[1])

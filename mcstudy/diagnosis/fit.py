@@ -141,6 +141,7 @@ def fit(
     known: Slopes | None = None,
     *,
     exact: bool = True,
+    weight: float = 1.0,
 ) -> Fit:
     """Return the most probable fit near a start.
 
@@ -150,6 +151,8 @@ def fit(
     ----------
     known : slopes from a fit near by, to begin with.
     exact : whether the slopes must be those of the most probable scores in the end.
+    weight : of the data against the priors; below 1 a misfit is taken less seriously, so that a
+        fit from far away does not end in the wrong valley.
 
     Raises
     ------
@@ -161,18 +164,19 @@ def fit(
     seen = observe_tests(problem, forms, layouts, scores)
     if seen is None:
         raise FitError("a run fails where the fit begins")
-    misfit = _misfit(layouts, seen, scores, scatter)
+    misfit = _misfit(layouts, seen, scores, scatter, weight)
     slopes, fresh = known, False
     for step in range(MOST_STEPS + 1):
         if slopes is None:
             slopes, fresh = _simulate_slopes(problem, forms, layouts, scores, seen, scatter), True
         residuals, own = _expand(layouts, seen, scores, slopes, scatter)
-        system = _System(residuals, own, slopes.shared, scores)
+        system = _System(residuals, own, slopes.shared, scores, weight)
+        last = step == MOST_STEPS
         better = None
-        if system.expected_gain >= CONVERGED and step < MOST_STEPS:
-            better = _descend(problem, forms, layouts, scores, system, scatter, misfit)
+        if system.expected_gain >= CONVERGED and not last:
+            better = _descend(problem, forms, layouts, scores, system, scatter, misfit, weight)
         if better is None:
-            if fresh or not exact or step == MOST_STEPS:
+            if fresh or last or not exact:
                 break
             slopes = None
             continue
@@ -180,6 +184,7 @@ def fit(
         if misfit - lower < LINEAR * system.expected_gain:
             slopes = None
         scores, misfit, fresh = moved, lower, False
+    assert slopes is not None
     return Fit(
         forms=forms,
         scatter=scatter,
@@ -188,7 +193,7 @@ def fit(
         slopes=slopes,
         residuals=tuple(residuals),
         own_slopes=tuple(own),
-        covariance=np.linalg.inv(system.schur),
+        covariance=np.asarray(np.linalg.inv(system.schur)),
         log_evidence=-misfit - 0.5 * system.log_determinant,
         misfit=misfit,
     )
@@ -237,24 +242,31 @@ def residuals_at(
     )
 
 
-def solve(centre: Centre, residuals: Sequence[Array]) -> tuple[Scores, float]:
-    """Return the scores that suit residuals best in the linear model, and the misfit there."""
-    system = _System(residuals, centre.own_slopes, centre.shared_slopes, centre.scores)
+def solve(centre: Centre, residuals: Sequence[Array], weight: float) -> tuple[Scores, float]:
+    """Return the scores that suit residuals best in the linear model, and the misfit there.
+
+    ``weight`` is that of the data against the priors.
+    """
+    system = _System(residuals, centre.own_slopes, centre.shared_slopes, centre.scores, weight)
     move = system.step()
     own = tuple(z + d for z, d in zip(centre.scores.own, move.own, strict=True))
-    squares = sum(float(r @ r) for r in residuals)
+    squares = weight**2 * sum(float(r @ r) for r in residuals)
     squares += float(centre.scores.shared @ centre.scores.shared)
     squares += sum(float(z @ z) for z in centre.scores.own)
     return Scores(centre.scores.shared + move.shared, own), 0.5 * squares - system.expected_gain
 
 
 def _misfit(
-    layouts: Sequence[Layout], seen: Sequence[Observation], scores: Scores, scatter: Scatter
+    layouts: Sequence[Layout],
+    seen: Sequence[Observation],
+    scores: Scores,
+    scatter: Scatter,
+    weight: float,
 ) -> float:
     total = float(scores.shared @ scores.shared)
     for layout, observation, own in zip(layouts, seen, scores.own, strict=True):
         residual = layout.residual(observation, own, scatter)
-        total += float(residual @ residual) + float(own @ own)
+        total += weight**2 * float(residual @ residual) + float(own @ own)
     return 0.5 * total
 
 
@@ -307,9 +319,7 @@ def _simulate_slopes(
         for step in (SHARED_STEP, -SHARED_STEP):
             moved_shared = scores.shared.copy()
             moved_shared[k] += step
-            found = residuals_at(
-                problem, layouts, forms, Scores(moved_shared, scores.own), scatter
-            )
+            found = residuals_at(problem, layouts, forms, Scores(moved_shared, scores.own), scatter)
             if found is not None:
                 for table, residual, other in zip(shared, residuals, found, strict=True):
                     table[:, k] = (residual - other) / step
@@ -326,14 +336,21 @@ class _System:
         own: Sequence[Array],
         shared: Sequence[Array],
         scores: Scores,
+        weight: float = 1.0,
     ) -> None:
         p = scores.shared.size
         self.schur = np.eye(p)
         right = -scores.shared.copy()
-        self._blocks = []
+        self._blocks: list[Array] = []
         self.log_determinant = 0.0
         gain = 0.0
-        for r, a, b, z in zip(residuals, own, shared, scores.own, strict=True):
+        for r, a, b, z in zip(
+            (weight * r for r in residuals),
+            (weight * a for a in own),
+            (weight * b for b in shared),
+            scores.own,
+            strict=True,
+        ):
             block = np.eye(a.shape[1]) + a.T @ a
             cross = a.T @ b
             pull = a.T @ r - z
@@ -342,15 +359,15 @@ class _System:
             right += b.T @ r - cross.T @ solved[:, p]
             self.log_determinant += float(np.linalg.slogdet(block)[1])
             gain += float(pull @ solved[:, p])
-            self._blocks.append(solved)
-        self.shared = np.linalg.solve(self.schur, right) if p else np.zeros(0)
+            self._blocks.append(np.asarray(solved))
+        self.shared: Array = np.asarray(np.linalg.solve(self.schur, right)) if p else np.zeros(0)
         self.log_determinant += float(np.linalg.slogdet(self.schur)[1]) if p else 0.0
         self.expected_gain = 0.5 * (gain + float(right @ self.shared))
 
     def step(self) -> Scores:
         """Return the move of all scores."""
         p = self.shared.size
-        own = tuple(b[:, p] - b[:, :p] @ self.shared for b in self._blocks)
+        own = tuple(np.asarray(b[:, p] - b[:, :p] @ self.shared) for b in self._blocks)
         return Scores(self.shared, own)
 
 
@@ -362,6 +379,7 @@ def _descend(
     system: _System,
     scatter: Scatter,
     misfit: float,
+    weight: float,
 ) -> tuple[Scores, list[Observation], float] | None:
     """Return scores that fit better along the step, with what was seen there."""
     move = system.step()
@@ -374,7 +392,7 @@ def _descend(
         )
         seen = observe_tests(problem, forms, layouts, trial)
         if seen is not None:
-            value = _misfit(layouts, seen, trial, scatter)
+            value = _misfit(layouts, seen, trial, scatter, weight)
             if value < misfit:
                 return trial, seen, value
         share *= 0.35

@@ -127,7 +127,9 @@ def _score(
         seeds = rng.integers(2**32, size=held.size)
         for name in MODELS:
             fitted = trained["base" if name == "gaussian_process" else name]
-            whole = base if name == "gaussian_process" else {"base": base, "extended": extended}[name]
+            whole = (
+                base if name == "gaussian_process" else {"base": base, "extended": extended}[name]
+            )
             predicted = _predict(problem, layouts, fitted, whole, held)
             if predicted is None:
                 continue
@@ -140,7 +142,7 @@ def _score(
     return scored
 
 
-def _train(problem: Problem, layouts: Sequence[Layout], whole: Fit, kept: Array) -> Fit:
+def _train(problem: Problem, layouts: Sequence[Layout], whole: Fit, kept: NDArray[np.int64]) -> Fit:
     """Return a fit to some of the tests, from that to all."""
     part = replace(problem, tests=tuple(problem.tests[i] for i in kept))
     slopes = Slopes(
@@ -246,7 +248,7 @@ def _log_density(off: Array, factor: Array) -> float:
 
 
 def _crps(draws: Array, target: float) -> float:
-    """Return the continuous ranked probability score of a sample (T. Gneiting, A. Raftery, 2007)."""
+    """Return the continuous ranked probability score of a sample (Gneiting, Raftery 2007)."""
     ordered = np.sort(draws)
     n = ordered.size
     spread = float(np.sum((2.0 * np.arange(1, n + 1) - n - 1.0) * ordered)) / n**2
@@ -264,30 +266,37 @@ def _compare(
         if set(by_model) != set(MODELS):
             continue
         tables = {name: np.array(values) for name, values in by_model.items()}
-        count = min(table.size for table in tables.values())
-        rows = rng.integers(count, size=(RESAMPLES, count))
-        square = score.startswith("rmse")
-        sign = 1.0 if score == "log_score" else -1.0
-
-        def mean(values: Array, square: bool = square) -> Array:
-            return np.sqrt(np.mean(values**2, -1)) if square else np.mean(values, -1)
-
-        def estimate(other: str) -> Estimate:
-            ours, theirs = tables["extended"], tables[other]
-            value = sign * float(mean(ours) - mean(theirs))
-            spread = sign * (mean(ours[rows]) - mean(theirs[rows]))
-            low, high = np.quantile(spread, [0.025, 0.975])
-            return Estimate(value, float(low), float(high))
-
+        rows = rng.integers(tables["base"].size, size=(RESAMPLES, tables["base"].size))
+        base, extended, process = (float(_mean(tables[model], score)) for model in MODELS)
         name = score.partition("_")[2]
         gains.append(
             Gain(
-                score,
-                region,
-                quantities[name][0] if name in quantities else "",
-                *(float(mean(tables[model])) for model in MODELS),
-                estimate("base"),
-                estimate("gaussian_process"),
+                score=score,
+                region=region,
+                unit=quantities[name][0] if name in quantities else "",
+                base=base,
+                extended=extended,
+                gaussian_process=process,
+                difference=_better(tables["extended"], tables["base"], score, rows),
+                against_process=_better(
+                    tables["extended"], tables["gaussian_process"], score, rows
+                ),
             )
         )
     return gains
+
+
+def _mean(values: Array, score: str) -> Array:
+    """Return the mean of a score over tests: of squares where it is a root mean square."""
+    if score.startswith("rmse"):
+        return np.asarray(np.sqrt(np.mean(values**2, axis=-1)))
+    return np.asarray(np.mean(values, axis=-1))
+
+
+def _better(ours: Array, theirs: Array, score: str, rows: NDArray[np.int64]) -> Estimate:
+    """Return by how much our score is better, with a paired bootstrap interval."""
+    sign = 1.0 if score == "log_score" else -1.0
+    value = sign * float(_mean(ours, score) - _mean(theirs, score))
+    spread = sign * (_mean(ours[rows], score) - _mean(theirs[rows], score))
+    low, high = np.quantile(spread, [0.025, 0.975])
+    return Estimate(value, float(low), float(high))

@@ -118,7 +118,9 @@ class Layout:
 
     def whitened(self, seen: Observation, scores: Array) -> Array:
         """Return the simulated vector, whitened, without repeatability."""
-        return -self._assemble(seen, np.where(self.scattering, 0.0, scores), NO_SCATTER, measured=False)[0]
+        return -self._assemble(
+            seen, np.where(self.scattering, 0.0, scores), NO_SCATTER, measured=False
+        )[0]
 
     def simulated(self, seen: Observation, scores: Array, scatter: Scatter) -> Array:
         """Return the simulated vector, whitened, with everything that the scores say."""
@@ -203,7 +205,9 @@ class Layout:
                 factor = 1.0 + modes @ pulse
                 simulated = shape * factor + signal.sd * offsets[k]
                 given = signal.values if measured else 0.0
-                parts.append(_whiten((given - simulated)[:, None], signal.sd, signal.correlation)[:, 0])
+                parts.append(
+                    _whiten((given - simulated)[:, None], signal.sd, signal.correlation)[:, 0]
+                )
                 if slope:
                     table = np.zeros((signal.time.size, own))
                     table[:, 0] = -TIME_ORIGIN * np.gradient(shape, signal.time) * factor

@@ -97,9 +97,7 @@ class Marginal:
         score = np.zeros((products[0].shape[0], rest))
         quadratic = np.zeros(score.shape[0])
         log_determinant = 0.0
-        for gram, product, scale in zip(
-            self._gram, products, self._scales(scatter), strict=True
-        ):
+        for gram, product, scale in zip(self._gram, products, self._scales(scatter), strict=True):
             q = scale.size
             block = np.eye(q) + scale[:, None] * gram[:q, :q] * scale
             cross = scale[:, None] * gram[:q, q:]

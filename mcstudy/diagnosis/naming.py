@@ -42,7 +42,9 @@ SURVEY = Scatter(0.02, 0.02)
 """Repeatability with which forms are tried before it is estimated."""
 UNSEEN = 0.05
 """Sum of squares over the noise below which a form changes nothing that was measured."""
-FARTHEST_START = 4.0
+FAR = 0.7
+"""Weight of the data below which a fit begins far away."""
+FARTHEST_START = 3.0
 """Score beyond which no fit begins."""
 CLOSE, WORSE = 100.0, 2.0
 """Log units and factor by which a form, or a second start, may promise less than the best."""
@@ -78,9 +80,7 @@ def settle(problem: Problem, layouts: Sequence[Layout], fitted: Fit) -> Fit:
     for last in (False, True):
         scatter = estimate_scatter(fitted, layouts, None)
         start = rescale(layouts, fitted, scatter)
-        fitted = fit(
-            problem, layouts, fitted.forms, start, scatter, fitted.slopes, exact=last
-        )
+        fitted = fit(problem, layouts, fitted.forms, start, scatter, fitted.slopes, exact=last)
     return fitted
 
 
@@ -97,9 +97,13 @@ def rescale(layouts: Sequence[Layout], fitted: Fit, scatter: Scatter) -> Scores:
 
 @dataclass(frozen=True)
 class Survey:
-    """A form tried over its prior: misfits and the scores to start from, most promising first."""
+    """A form tried over its prior: misfits and the scores to start from, most promising first.
+
+    ``weight`` is that of the data: the larger the misfit without the form, the less.
+    """
 
     form: Form
+    weight: float
     misfits: tuple[float, ...]
     starts: tuple[Scores, ...]
 
@@ -123,6 +127,9 @@ def survey(
     """
     tried: list[tuple[float, Scores]] = []
     changes = 0.0
+    samples = sum(r.size for r in centres[0].residuals)
+    least = min(solve(centre, centre.residuals, 1.0)[1] for centre in centres)
+    weight = min(1.0, float(np.sqrt(0.5 * samples / least)))
     for centre, scores in itertools.product(centres, score_grid(form)):
         start = Scores(np.concatenate([centre.scores.shared, scores]), centre.scores.own)
         residuals = residuals_at(problem, layouts, (*forms, form), start, SURVEY)
@@ -130,7 +137,7 @@ def survey(
             continue
         for found, before in zip(residuals, centre.residuals, strict=True):
             changes = max(changes, float(np.sum((found - before) ** 2)))
-        solved, misfit = solve(centre, residuals)
+        solved, misfit = solve(centre, residuals, weight)
         shared = np.clip(solved.shared, -FARTHEST_START, FARTHEST_START)
         own = tuple(np.clip(z, -FARTHEST_START, FARTHEST_START) for z in solved.own)
         whole = misfit + 0.5 * float(scores @ scores)
@@ -145,7 +152,28 @@ def survey(
         if misfit < WORSE * tried[0][0] + CLOSE and apart >= APART:
             chosen.append((misfit, start))
             break
-    return Survey(form, tuple(m for m, _ in chosen), tuple(start for _, start in chosen))
+    return Survey(form, weight, tuple(m for m, _ in chosen), tuple(start for _, start in chosen))
+
+
+def _approach(
+    problem: Problem,
+    layouts: Sequence[Layout],
+    forms: tuple[Form, ...],
+    start: Scores,
+    weight: float,
+) -> Fit:
+    """Return a fit from far away: the data gain weight as the fit comes near.
+
+    Raises
+    ------
+    FitError
+        If a run fails at the start.
+    """
+    for stage in (weight, np.sqrt(weight)) if weight < FAR else ():
+        found = fit(problem, layouts, forms, start, SURVEY, exact=False, weight=stage)
+        # What tests put down to nuisances while the shared values were wrong is forgotten.
+        start = Scores(found.scores.shared, tuple(np.zeros_like(z) for z in start.own))
+    return fit(problem, layouts, forms, start, SURVEY, exact=False)
 
 
 def fit_form(
@@ -155,7 +183,7 @@ def fit_form(
     best: Fit | None = None
     for start in surveyed.starts:
         try:
-            found = fit(problem, layouts, (*forms, surveyed.form), start, SURVEY, exact=False)
+            found = _approach(problem, layouts, (*forms, surveyed.form), start, surveyed.weight)
         except FitError:
             continue
         if best is None or found.log_evidence > best.log_evidence:
@@ -190,9 +218,7 @@ def rank_causes(
     taken = {form.cause for form in base.forms}
     forms = [form for c in causes if c.name not in taken for form in c.forms]
     pool = Parallel(n_jobs=workers)
-    surveys = pool(
-        delayed(survey)(problem, layouts, base.forms, centres, form) for form in forms
-    )
+    surveys = pool(delayed(survey)(problem, layouts, base.forms, centres, form) for form in forms)
     seen = sorted((s for s in surveys if s is not None), key=lambda s: s.misfits[0])
     promising = [
         s
@@ -223,9 +249,7 @@ def rank_causes(
     return sorted(candidates, key=lambda candidate: -candidate.log_evidence)
 
 
-def examine(
-    problem: Problem, layouts: Sequence[Layout], base: Fit, extended: Fit
-) -> Remainder:
+def examine(problem: Problem, layouts: Sequence[Layout], base: Fit, extended: Fit) -> Remainder:
     """Return what an extended fit leaves behind, against what it explained."""
     names = shared_names(problem, extended.forms)
     p_value, left, discrepancy, drift = remaining(

@@ -191,9 +191,8 @@ def _with(
         test = _noise_free(layout.test, observation, inputs, extra, layout.shift)
         places.append(Layout(test, layout.shift, layout.window))
     other = replace(known, tests=tuple(place.test for place in places))
-    own = tuple(np.zeros(len(place.names)) for place in places)
-    scores = Scores(best.scores.shared, own)
-    centred = fit(other, places, best.forms, scores, best.scatter)
+    zero = tuple(np.zeros(len(place.names)) for place in places)
+    centred = fit(other, places, best.forms, Scores(best.scores.shared, zero), best.scatter)
     return other, places, centred
 
 

@@ -86,13 +86,20 @@ class Unknown:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a cause: name, unit, meaning, quantile of the prior, the value for none."""
+    """A parameter of a cause.
+
+    Attributes
+    ----------
+    name, unit, meaning : of it. quantile : of the prior. none : value at which it does nothing.
+    family : of the prior: ``lognormal``, ``normal`` or ``uniform``.
+    """
 
     name: str
     unit: str
     meaning: str
     quantile: Quantile
     none: float
+    family: str
 
 
 @dataclass(frozen=True)
@@ -112,7 +119,9 @@ class Form:
 
     def values(self, scores: Sequence[float] | Array) -> dict[str, float]:
         """Return the parameters by name at scores of the free ones."""
-        free = {p.name: value_at(p.quantile, float(z)) for p, z in zip(self.free, scores, strict=True)}
+        free = {
+            p.name: value_at(p.quantile, float(z)) for p, z in zip(self.free, scores, strict=True)
+        }
         return {**self.fixed, **free}
 
 
@@ -142,7 +151,8 @@ class Simulate(Protocol):
 
     def __call__(
         self, inputs: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]
-    ) -> Observation | None: ...
+    ) -> Observation | None:
+        """Return the test as the channels would record it."""
 
 
 @dataclass(frozen=True)

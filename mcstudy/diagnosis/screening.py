@@ -157,7 +157,7 @@ def screen(
     marginal = Marginal(fitted, layouts, tables)
     sizes = [len(bank), len(drift.names), len(smooth.names), len(fine.names)]
     edges = np.cumsum([0, *sizes])
-    parts = [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    parts = [slice(a, b) for a, b in itertools.pairwise(edges)]
     measured = marginal.reduce(marginal.measured(), fitted.scatter)
     errors = _errors(marginal, measured.information)
     found = _statistics(measured, parts, errors)[0]
@@ -249,10 +249,10 @@ def _statistics(reduced: Reduced, parts: Sequence[slice], errors: Array) -> Arra
     for part in parts[:2]:
         standard = np.abs(reduced.score[:, part] / errors[part])
         columns.append(standard.max(axis=1, initial=0.0))
-    for part in parts[2:]:
-        columns.append(
-            quadratic_form(reduced.information[part, part], reduced.score[:, part])[0]
-        )
+    columns += [
+        quadratic_form(reduced.information[part, part], reduced.score[:, part])[0]
+        for part in parts[2:]
+    ]
     return np.stack(columns, axis=1)
 
 

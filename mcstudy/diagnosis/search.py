@@ -92,9 +92,7 @@ def fit_base(problem: Problem) -> tuple[tuple[Layout, ...], Fit]:
         if seen is None:
             raise UserError(f"test {test.name!r}: the model fails at its recorded inputs")
         layouts.append(lay_out(test, seen))
-    found = fit(
-        problem, layouts, (), start_scores(layouts, len(problem.unknowns)), SURVEY
-    )
+    found = fit(problem, layouts, (), start_scores(layouts, len(problem.unknowns)), SURVEY)
     for _ in range(2):
         scatter = estimate_scatter(found, layouts, smooth_discrepancy(layouts, found))
         found = fit(problem, layouts, (), rescale(layouts, found, scatter), scatter)
@@ -207,7 +205,10 @@ def _best_pair(
         if not seconds:
             continue
         whole = first.fitted.log_evidence + seconds[0].log_evidence
-        if best is not None and whole <= best.first.fitted.log_evidence + best.seconds[0].log_evidence:
+        if (
+            best is not None
+            and whole <= best.first.fitted.log_evidence + best.seconds[0].log_evidence
+        ):
             continue
         left = examine(problem, empty.layouts, empty.base, seconds[0].fitted)
         best = _Pair(first, seconds, left)

@@ -38,4 +38,4 @@ def _parameter(effect: Effect, name: str) -> Parameter:
     def quantile(probability: float) -> float:
         return min(max(float(entry.prior.quantile(probability)), item.low), item.high)
 
-    return Parameter(name, item.unit, item.meaning, quantile, entry.none)
+    return Parameter(name, item.unit, item.meaning, quantile, entry.none, entry.prior.distribution)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from mcstudy import units
 from mcstudy.diagnosis.channels import computed_channels
 from mcstudy.diagnosis.noise import estimate_noise
-from mcstudy.diagnosis.problem import Problem, Scalar, Signal, Test, Unknown
+from mcstudy.diagnosis.problem import Problem, Quantile, Scalar, Signal, Test, Unknown
 from mcstudy.errors import UserError
 from mcstudy.inputs import Distribution
 from mcstudy.measured import HEADER, Measured
 from models.criteria.units import STANDARD_GRAVITY
 from models.protocol import Model
+from studies.diagnosis.model_choice import ModelChoice
 from studies.diagnosis.simulation import DERIVED, Simulation, channel_units
 
 Array = NDArray[np.float64]
@@ -29,16 +30,6 @@ SIZEABLE = 0.05
 """Share of the peak from which a sample is sizeable."""
 FEWEST = 3
 """Tests below which a diagnosis makes no sense."""
-
-
-@dataclass(frozen=True)
-class ModelChoice:
-    """The model that is diagnosed: name, options, effects already switched on, fixed inputs."""
-
-    name: str
-    options: Mapping[str, Any]
-    effects: Mapping[str, Mapping[str, float]]
-    fixed: Mapping[str, float]
 
 
 def build_problem(data: Measured, choice: ModelChoice, simulation: Simulation) -> Problem:
@@ -66,11 +57,8 @@ def build_problem(data: Measured, choice: ModelChoice, simulation: Simulation) -
                 )
     if len(data.tests) < FEWEST:
         raise UserError(f"{data.source / 'tests.csv'}: a diagnosis takes {FEWEST} tests or more")
-    fixed = {**choice.fixed, **fixed_inputs(data)}
     noise = _noise_of(data, channel_units(model, list(header.signals)))
-    tests = tuple(
-        _test(data, model, k, fixed, noise) for k in range(len(data.tests))
-    )
+    tests = tuple(_test(data, model, k, choice.fixed, noise) for k in range(len(data.tests)))
     refused = computed_channels(
         tests, mass="headform_mass", speed="impact_speed", gravity=STANDARD_GRAVITY
     )
@@ -90,17 +78,7 @@ def build_problem(data: Measured, choice: ModelChoice, simulation: Simulation) -
     )
 
 
-def fixed_inputs(data: Measured) -> dict[str, float]:
-    """Return the inputs that the data fix for all tests."""
-    return {k: float(v) for k, v in data.header.fixed.items() if isinstance(v, float | int)}
-
-
-def fixed_options(data: Measured) -> dict[str, Any]:
-    """Return the options of the model that the data fix, such as the hood's curve."""
-    return {k: v for k, v in data.header.fixed.items() if isinstance(v, list)}
-
-
-def _quantile_of(place: Any, name: str, distribution: Distribution, unit: str) -> Any:
+def _quantile_of(place: Path, name: str, distribution: Distribution, unit: str) -> Quantile:
     if distribution.parents:
         raise UserError(f"{place}: uncertain.{name} may not depend on another input")
     try:
@@ -151,18 +129,22 @@ def _thinned(time: Array, values: Array) -> tuple[Array, Array]:
     if size == 1:
         return time, values
     count = time.size // size
-    parts = (x[: count * size].reshape(count, size).mean(axis=1) for x in (time, values))
-    return tuple(parts)  # type: ignore[return-value]
+    means = [x[: count * size].reshape(count, size).mean(axis=1) for x in (time, values)]
+    return means[0], means[1]
 
 
 def _lead_in(time: Array, values: Array) -> Array:
     """Return the samples before contact."""
     first = int(np.argmax(np.abs(values) >= SIZEABLE * np.abs(values).max()))
-    return values[time < time[first] - BEFORE]
+    return np.asarray(values[time < time[first] - BEFORE])
 
 
 def _test(
-    data: Measured, model: Model, row: int, fixed: Mapping[str, float], noise: Mapping[str, _Channel]
+    data: Measured,
+    model: Model,
+    row: int,
+    fixed: Mapping[str, float],
+    noise: Mapping[str, _Channel],
 ) -> Test:
     header = data.header
     name = str(data.tests["test"].iloc[row])
@@ -213,7 +195,9 @@ def _scalars(data: Measured, model: Model, row: int) -> list[Scalar]:
         value = float(data.tests[name].iloc[row]) * scale
         # What was not measured has no weight.
         missing = not np.isfinite(value)
-        found.append(Scalar(name, 0.0 if missing else value, np.inf if missing else entry.sd * scale))
+        found.append(
+            Scalar(name, 0.0 if missing else value, np.inf if missing else entry.sd * scale)
+        )
     return found
 
 

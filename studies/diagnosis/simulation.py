@@ -22,6 +22,7 @@ DERIVED = {
 }
 """Outputs that follow from a measured channel: no evidence of their own."""
 
+
 def channel_units(model: Model, names: Collection[str]) -> dict[str, str]:
     """Return the units of channels ``<group>_<channel>`` of a model's histories."""
     if not names:
@@ -52,7 +53,7 @@ class Simulation:
         scalars: Collection[str],
         effects: Mapping[str, Mapping[str, float]] | None = None,
     ) -> None:
-        self._name, self._options = name, dict(options)
+        self.name, self._options = name, dict(options)
         self._filters, self._scalars = dict(filters), tuple(scalars)
         self._effects = {k: dict(v) for k, v in (effects or {}).items()}
         self._models: dict[tuple[str, ...], Model] = {}
@@ -62,8 +63,18 @@ class Simulation:
         key = tuple(sorted(effects))
         if key not in self._models:
             chosen = self._effects | {name: {} for name in key}
-            self._models[key] = load_model(self._name, self._options, chosen)
+            self._models[key] = load_model(self.name, self._options, chosen)
         return self._models[key]
+
+    def widened(self, filters: Mapping[str, float], scalars: Collection[str]) -> "Simulation":
+        """Return the simulation with more channels and scalars."""
+        return Simulation(
+            self.name,
+            self._options,
+            {**self._filters, **filters},
+            (*self._scalars, *scalars),
+            self._effects,
+        )
 
     def __call__(
         self, inputs: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]
@@ -81,7 +92,7 @@ class Simulation:
             group, _, channel = name.partition("_")
             history = run.histories[group]
             signal = history.channels[channel]
-            if channel_class > 0.0 and name not in FILTERED[self._name]:
+            if channel_class > 0.0 and name not in FILTERED[self.name]:
                 rate = 1.0 / float(history.time[1] - history.time[0])
                 signal = filter_cfc(signal, rate, channel_class)
             signals[name] = (history.time, signal)

@@ -3,7 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
-from hidden_effects import Hidden, Laboratory
+
+from studies.validation.diagnosis.hidden_effects import Hidden, Laboratory
 
 Draw = Callable[[np.random.Generator], Hidden]
 
@@ -45,7 +46,9 @@ CATALOGUE: dict[str, list[Draw]] = {
     "unloading_slope": [_factor("unloading_slope", 0.05, 0.4)],
     "sensor_gain": [_factor("sensor_gain", 0.004, 0.06)],
     "sensor_offset": [
-        lambda rng: Hidden("sensor_offset", "catalogue", {"offset": _sign(rng) * _between(rng, 0.3, 4.0)})
+        lambda rng: Hidden(
+            "sensor_offset", "catalogue", {"offset": _sign(rng) * _between(rng, 0.3, 4.0)}
+        )
     ],
     "sensor_saturation": [_one("sensor_saturation", "catalogue", limit=(90.0, 160.0))],
     "sensor_filter": [_one("sensor_filter", "catalogue", channel_class=(90.0, 600.0))],

@@ -9,6 +9,7 @@ functional forms. The answer key is returned apart from the data.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -59,9 +60,21 @@ class Laboratory:
 
 
 def make_tests(
-    folder: Path, hidden: Sequence[Hidden], seed: int, laboratory: Laboratory | None = None
+    folder: Path,
+    hidden: Sequence[Hidden],
+    seed: int,
+    laboratory: Laboratory | None = None,
+    *,
+    header_of: Laboratory | None = None,
 ) -> None:
-    """Write a folder of measured tests with the effects in it."""
+    """Write a folder of measured tests with the effects in it.
+
+    Parameters
+    ----------
+    folder : to be made. hidden : effects. seed : of speeds, noise and scatter.
+    laboratory : how the tests were made. header_of : what ``measured.toml`` says of that, by
+        default the truth.
+    """
     lab = laboratory or Laboratory()
     rng = np.random.default_rng(seed)
     scale = float(np.exp(rng.normal(0.0, lab.scale_sd)))
@@ -88,7 +101,7 @@ def make_tests(
             row["rebound_speed"] = rebound + rng.normal(0.0, 0.02)
         rows.append(row)
     pd.DataFrame(rows).to_csv(folder / "tests.csv", index=False)
-    (folder / "measured.toml").write_text(_header(lab), encoding="utf-8")
+    (folder / "measured.toml").write_text(_header(header_of or lab), encoding="utf-8")
 
 
 def _header(lab: Laboratory) -> str:
@@ -177,7 +190,7 @@ def _loading(hidden: Sequence[Hidden], scale: float, order: int) -> Law:
             # Outside the catalogue: the panel rings as it is pushed in.
             h = changes["ringing"]
             force *= 1.0 + h.numbers["share"] * np.sin(2.0 * np.pi * depth / h.numbers["length"])
-        return force
+        return float(force)
 
     return law
 
@@ -193,7 +206,7 @@ def _strike(
     if (h := _numbers(hidden, "unloading_slope")) is not None:
         ratio = 1.0 + (ratio - 1.0) * h.numbers["factor"]
     law = _loading(hidden, scale, order)
-    options = {"rtol": 1e-9, "atol": 1e-10, "max_step": 1e-4, "dense_output": True}
+    options: Any = {"rtol": 1e-9, "atol": 1e-10, "max_step": 1e-4, "dense_output": True}
 
     def into(_t: float, y: Array) -> list[float]:
         return [y[1], -law(y[0], y[1]) / mass]

@@ -1,0 +1,188 @@
+"""Pictures of a diagnosis: pulses and residuals, where the misfit is, causes, gain."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mcstudy.figures import style
+from mcstudy.figures.panels import Band, Curve, Panel, draw_panels
+
+COLOURS = {"base": style.BLUE, "extended": style.RED}
+NAMES = {"base": "model as it stands", "extended": "extended model"}
+LARGEST = 10.0
+"""Standard errors at which the colours of a map end."""
+FEWEST = 1e-3
+
+
+def draw_pulses(curves: Sequence[Mapping[str, Any]], label: str) -> Figure:
+    """Return measured and simulated pulses of some tests, and what lies between them below.
+
+    Parameters
+    ----------
+    curves : a test each: time (s), measured, and by model mean, low, high.
+    label : of the channel, with its unit.
+    """
+    upper, lower = [], []
+    for entry in curves:
+        time = 1e3 * np.array(entry["time"])
+        measured = np.array(entry["measured"])
+        title = str(entry["test"])
+        if entry.get("impact_speed") is not None:
+            title += f", {entry['impact_speed']:.1f} m/s"
+        shown = [Curve(time, measured, "measured", "#000000")]
+        rest, bands, around = [], [], []
+        for key, colour in COLOURS.items():
+            if key not in entry:
+                continue
+            part = {name: np.array(values) for name, values in entry[key].items()}
+            shown.append(Curve(time, part["mean"], NAMES[key], colour, "--"))
+            bands.append(Band(time, part["low"], part["high"], None, colour))
+            rest.append(Curve(time, measured - part["mean"], NAMES[key], colour))
+            around.append(
+                Band(time, part["low"] - part["mean"], part["high"] - part["mean"], None, colour)
+            )
+        upper.append(Panel("time [ms]", label, shown, bands, title))
+        lower.append(Panel("time [ms]", f"measured - simulated: {label}", rest, around))
+    return draw_panels([*upper, *lower], columns=len(upper), width=3.9, height=3.2)
+
+
+def draw_map(where: Mapping[str, Any], labels: Mapping[str, str], regime: str) -> Figure:
+    """Return where measured and simulated differ: parts of the pulse against groups of tests.
+
+    Parameters
+    ----------
+    where : regions by channel, window and group. labels : of channels.
+    regime : label of what the tests are grouped by.
+    """
+    regions = [r for r in where["regions"] if r["channel"] in labels]
+    channels = list(dict.fromkeys(r["channel"] for r in regions))
+    with style.styled():
+        figure = style.new_figure(7.5, 2.2 * len(channels) + 0.5)
+        grid = figure.subplots(len(channels), 1, squeeze=False)[:, 0]
+        for axes, channel in zip(grid, channels, strict=True):
+            own = [r for r in regions if r["channel"] == channel]
+            groups = list(dict.fromkeys(r["group"] for r in own))
+            groups = [g for g in ("low", "middle", "high", "all") if g in groups]
+            table = np.array([[r["z"] for r in own if r["group"] == g] for g in groups])
+            edges = [1e3 * r["begin"] for r in own if r["group"] == groups[0]]
+            edges.append(1e3 * next(r["end"] for r in reversed(own) if r["group"] == groups[0]))
+            rows = np.arange(len(groups) + 1)
+            mesh = axes.pcolormesh(edges, rows, table, cmap="PuOr_r", vmin=-LARGEST, vmax=LARGEST)
+            for j in range(table.shape[0]):
+                for k in range(table.shape[1]):
+                    middle = 0.5 * (edges[k] + edges[k + 1])
+                    colour = "white" if abs(table[j, k]) > 0.7 * LARGEST else "black"
+                    axes.text(middle, j + 0.5, f"{table[j, k]:+.1f}", ha="center", va="center",
+                              fontsize=8, color=colour)  # fmt: skip
+            names = []
+            for group in groups:
+                first = next(r for r in own if r["group"] == group)
+                names.append(f"{first['low']:.3g} to {first['high']:.3g}")
+            axes.set_yticks(rows[:-1] + 0.5, names)
+            axes.set(xlabel="time from the begin of the pulse [ms]", ylabel=regime,
+                     title=labels[channel])  # fmt: skip
+            axes.grid(visible=False)
+            figure.colorbar(mesh, ax=axes, label="measured above simulated\n[standard errors]")
+        return figure
+
+
+def draw_evidence(effects: Sequence[Mapping[str, Any]]) -> Figure:
+    """Return the causes by evidence above the model as it stands."""
+    shown = list(effects)[:12]
+    with style.styled():
+        figure = style.new_figure(7.0, 0.34 * len(shown) + 1.2)
+        axes = figure.subplots()
+        values = [row["log_evidence"] for row in shown]
+        colours = [style.RED if k == 0 or row["ambiguous"] else style.GREY
+                   for k, row in enumerate(shown)]  # fmt: skip
+        places = np.arange(len(shown))
+        axes.barh(places, values, color=colours, height=0.65)
+        axes.set_yticks(places, [row["name"].replace("_", " ") for row in shown])
+        axes.invert_yaxis()
+        axes.axvline(3.0, color="black", linestyle=":", linewidth=1.0)
+        axes.set_xscale("symlog", linthresh=10.0)
+        axes.set_xlabel("log evidence above the model as it stands [natural log units]")
+        axes.grid(visible=False, axis="y")
+        return figure
+
+
+def draw_gain(gains: Sequence[Mapping[str, Any]], labels: Mapping[str, str]) -> Figure:
+    """Return by how much predictions of held-out tests are better, in per cent of the base."""
+    shown = [g for g in gains if g["score"] in labels and abs(g["base"]) > FEWEST]
+    regions = list(dict.fromkeys(g["region"] for g in shown))
+    with style.styled():
+        figure = style.new_figure(8.5, 0.42 * max(len(shown), 3) + 1.2)
+        grid = figure.subplots(1, len(regions), squeeze=False, sharey=True)[0]
+        for axes, region in zip(grid, regions, strict=True):
+            own = [g for g in shown if g["region"] == region]
+            for k, gain in enumerate(own):
+                scale = 100.0 / abs(gain["base"])
+                entry = gain["difference"]
+                axes.plot([scale * entry["low"], scale * entry["high"]], [k, k], color=style.RED)
+                axes.plot(scale * entry["value"], k, "o", color=style.RED,
+                          label="extended model" if k == 0 else None)  # fmt: skip
+                process = scale * (gain["base"] - gain["gaussian_process"])
+                axes.plot(process, k, "s", color=style.BLUE, markerfacecolor="none",
+                          label="Gaussian process" if k == 0 else None)  # fmt: skip
+            axes.set_yticks(range(len(own)), [labels[g["score"]] for g in own])
+            axes.invert_yaxis()
+            axes.axvline(0.0, color="black", linewidth=0.8)
+            axes.set(xlabel="better than the model as it stands [%]",
+                     title=f"{region} the speeds used")  # fmt: skip
+            axes.legend(fontsize=8, loc="best")
+        return figure
+
+
+def draw_conclusions(base: Mapping[str, Any], extended: Mapping[str, Any], label: str) -> Figure:
+    """Return what the extension changes: exceedance of the output, and what drives it."""
+    with style.styled():
+        figure = style.new_figure(9.5, 3.8)
+        left, right = figure.subplots(1, 2)
+        for key, part in (("base", base), ("extended", extended)):
+            values = np.sort(np.array(part["values"]))
+            share = 1.0 - np.arange(values.size) / values.size
+            left.step(values, share, color=COLOURS[key], label=NAMES[key])
+        left.axvline(base["limit"], color="black", linestyle=":",
+                     label=f"limit {base['limit']:g}")  # fmt: skip
+        left.set(xlabel=label, ylabel="share of impacts above [-]", ylim=(0.0, 1.02))
+        left.legend(fontsize=8)
+        names = sorted(extended["drivers"], key=lambda n: -extended["drivers"][n]["value"])[:8]
+        for k, name in enumerate(names):
+            for shift, key, part in ((-0.15, "base", base), (0.15, "extended", extended)):
+                entry = part["drivers"].get(name)
+                if entry is None:
+                    continue
+                right.plot([entry["low"], entry["high"]], [k + shift] * 2, color=COLOURS[key])
+                right.plot(entry["value"], k + shift, "o", color=COLOURS[key])
+        right.set_yticks(range(len(names)), [style.words(n) for n in names])
+        right.invert_yaxis()
+        right.set_xlabel("first-order index [-]")
+        return figure
+
+
+def draw_scalars(
+    rows: Mapping[str, Sequence[Mapping[str, Any]]], labels: Mapping[str, str]
+) -> Figure:
+    """Return measured against simulated scalars, bars of two standard errors."""
+    names = [name for name in rows if rows[name]]
+    with style.styled():
+        figure = style.new_figure(4.2 * min(len(names), 3), 3.6 * -(-len(names) // 3))
+        grid = figure.subplots(-(-len(names) // 3), min(len(names), 3), squeeze=False)
+        for axes in grid.flat[len(names) :]:
+            axes.set_visible(False)
+        for axes, name in zip(grid.flat, names, strict=False):
+            measured = np.array([row["measured"] for row in rows[name]])
+            for key, colour in COLOURS.items():
+                if key not in rows[name][0]:
+                    continue
+                x = np.array([row[key] for row in rows[name]])
+                spread = 2.0 * np.array([row[f"{key}_sd"] for row in rows[name]])
+                axes.errorbar(x, measured, xerr=spread, fmt="o", color=colour, markersize=3.5,
+                              elinewidth=0.8, label=NAMES[key])  # fmt: skip
+            ends = [measured.min(), measured.max()]
+            axes.plot(ends, ends, color="black", linewidth=0.8)
+            axes.set(xlabel=f"simulated: {labels[name]}", ylabel=f"measured: {labels[name]}")
+            axes.legend(fontsize=8)
+        return figure

@@ -1,0 +1,70 @@
+"""What an extended model changes in the conclusions of a study."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mcstudy import config, designs, seeds, statistics
+from mcstudy.config import MonteCarloStudy, SobolStudy, parse_study
+from mcstudy.sensitivity.rank_based import rank_first_order
+from models.protocol import complete_status
+from studies.execution import load_study_model
+
+OUTPUT = "hic15"
+LIMIT = 700.0
+"""HIC15 limit of the case's paper for a child."""
+RUNS = {"headform": 1000, "multibody": 200}
+"""Runs with which conclusions are compared, by model."""
+REPLICATE = 50
+
+
+@dataclass(frozen=True)
+class Conclusions:
+    """What a study says: probability above the limit, median, and what drives the output."""
+
+    exceedance: statistics.Estimate
+    median: statistics.Estimate
+    drivers: dict[str, statistics.Estimate]
+    values: list[float]
+
+
+def conclude(text: str) -> Conclusions | None:
+    """Return the conclusions of a study file; None if it has none, or too many runs fail."""
+    study = parse_study(text, "extended model")
+    if not isinstance(study, MonteCarloStudy | SobolStudy):
+        return None
+    model = load_study_model(study)
+    n = RUNS[model.name]
+    uniforms = designs.draw("latin-hypercube", n, REPLICATE, len(study.inputs), study.seed)
+    columns = config.map_inputs(study, model, uniforms)
+    rows = np.stack([columns[item.name] for item in model.inputs], axis=1)
+    batch = model.run_batch(rows)
+    column = [item.name for item in model.outputs].index(OUTPUT)
+    values = batch.outputs[:, column]
+    good = np.isfinite(values) & np.isin(batch.status, list(complete_status(model)))
+    if good.sum() < n // 2:
+        return None
+    replicate = (np.arange(n) // REPLICATE)[good]
+    held = values[good]
+    names = list(study.inputs)
+    table = np.stack([columns[name][good] for name in names], axis=1)
+    indices = rank_first_order(table, held, seeds.generator(study.seed, seeds.GIVEN_DATA))
+    return Conclusions(
+        statistics.probability(held > LIMIT, replicate),
+        statistics.quantile(held, 0.5, replicate),
+        {name: statistics.Estimate(*map(float, indices[:, k])) for k, name in enumerate(names)},
+        [float(v) for v in held],
+    )
+
+
+def as_dict(found: Conclusions) -> dict[str, Any]:
+    """Return conclusions as plain data."""
+    return {
+        "output": OUTPUT,
+        "limit": LIMIT,
+        "exceedance": found.exceedance.as_dict(),
+        "median": found.median.as_dict(),
+        "drivers": {name: entry.as_dict() for name, entry in found.drivers.items()},
+        "values": found.values,
+    }

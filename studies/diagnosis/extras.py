@@ -1,0 +1,34 @@
+"""Measurements that could be added, and simulations that give them."""
+
+import tomllib
+from importlib.resources import files
+
+from mcstudy.diagnosis.power import Extra
+from mcstudy.diagnosis.problem import Problem
+from studies.diagnosis.simulation import Simulation
+
+_CLASS = 1000.0
+"""Channel frequency class of an added signal of force."""
+
+
+def extras_of(problem: Problem, simulation: Simulation) -> list[tuple[Extra, Simulation]]:
+    """Return the measurements that the tests lack, each with a simulation that has it."""
+    text = files("studies.diagnosis").joinpath("measurements.toml").read_text(encoding="utf-8")
+    test = problem.tests[0]
+    channels = {signal.name for signal in test.signals}
+    scalars = {scalar.name for scalar in test.scalars}
+    found = []
+    for row in tomllib.loads(text).get(simulation.name, ()):
+        extra = Extra(
+            row["title"],
+            {name: float(sd) for name, sd in row.get("signals", {}).items()},
+            {name: float(sd) for name, sd in row.get("scalars", {}).items()},
+            {name: float(sd) for name, sd in row.get("inputs", {}).items()},
+        )
+        if set(extra.signals) & channels or set(extra.scalars) & scalars:
+            continue
+        if any(sd >= test.doubtful.get(name, 0.0) for name, sd in extra.inputs.items()):
+            continue
+        filters = {name: _CLASS if name.endswith("_force") else 0.0 for name in extra.signals}
+        found.append((extra, simulation.widened(filters, tuple(extra.scalars))))
+    return found

@@ -1,0 +1,91 @@
+"""Which model is diagnosed: the one that the data name, or that of a study file."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mcstudy import config
+from mcstudy.config import Study, load_study
+from mcstudy.errors import UserError
+from mcstudy.measured import HEADER, Measured
+from models.registry import load_model, model_names
+
+
+@dataclass(frozen=True)
+class ModelChoice:
+    """The model that is diagnosed.
+
+    Attributes
+    ----------
+    name, options : of the model. effects : already switched on. fixed : inputs.
+    study : the study file that it comes from, with its text; None without one.
+    """
+
+    name: str
+    options: Mapping[str, Any]
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    study: Study | None = None
+    text: str = ""
+
+
+def choose_model(data: Measured, file: Path | None) -> ModelChoice:
+    """Return the model of measured data, options and inputs that the data fix included.
+
+    Parameters
+    ----------
+    data : Measured. file : study file whose model is diagnosed, or None.
+
+    Raises
+    ------
+    UserError
+        If there is no such model, or an option or fixed input does not fit it.
+    """
+    header = data.header
+    place = data.source / HEADER
+    if header.model not in model_names():
+        raise UserError(
+            f"{place}: model: no model {header.model!r}, only {', '.join(model_names())}"
+        )
+    options: dict[str, Any] = {}
+    effects: Mapping[str, Mapping[str, float]] = {}
+    fixed: dict[str, float] = {}
+    study, text = None, ""
+    if file is not None:
+        study = load_study(file)
+        text = file.read_text(encoding="utf-8")
+        if study.model.name != header.model:
+            raise UserError(
+                f"{file}: model.name is {study.model.name!r}, but the data are of {header.model!r}"
+            )
+        options, effects = dict(study.model.options), study.effects
+    for name, value in header.fixed.items():
+        if isinstance(value, list):
+            options[name] = value
+    signals = header.signals
+    if "head_acceleration" in signals and header.model == "headform":
+        options["channel_class"] = signals["head_acceleration"].channel_class
+    try:
+        model = load_model(header.model, options, effects)
+    except (ValueError, TypeError) as error:
+        raise UserError(f"{file or place}: model: {error}") from None
+    if study is not None:
+        fixed |= config.fixed_values(study, model)
+    known = {item.name: item for item in model.inputs}
+    for name, value in header.fixed.items():
+        if isinstance(value, list):
+            continue
+        if name not in known:
+            raise UserError(
+                f"{place}: fixed.{name}: model {header.model!r} has no such input; it has "
+                f"{', '.join(known)}"
+            )
+        item = known[name]
+        if not item.low <= float(value) <= item.high:
+            raise UserError(
+                f"{place}: fixed.{name}: {float(value):g} {item.unit} is outside {item.low:g} to "
+                f"{item.high:g} {item.unit}"
+            )
+        fixed[name] = float(value)
+    return ModelChoice(header.model, options, effects, fixed, study, text)

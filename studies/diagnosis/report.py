@@ -1,0 +1,244 @@
+"""The report of a diagnosis."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from mcstudy.figures import diagnosis as figures_of
+from mcstudy.figures import style
+from mcstudy.report import Section, Table
+from mcstudy.text import number
+from studies.diagnosis import words
+
+SCORES = {
+    "crps_hic15": "CRPS of HIC15",
+    "rmse_hic15": "RMSE of HIC15",
+    "crps_peak_head_acceleration": "CRPS of the peak",
+    "rmse_head_acceleration": "RMSE of the pulse",
+    "rmse_hood_force": "RMSE of the force",
+}
+SIGNAL_UNITS = {
+    "head_acceleration": "g",
+    "hood_force": "N",
+    "hood_penetration": "m",
+    "head_angular_velocity": "rad/s",
+}
+
+
+def subtitle_of(answer: Mapping[str, Any]) -> str:
+    """Return the subtitle of a report."""
+    data = answer["data"]
+    return f"{data['tests']} tests against the {data['model']} model"
+
+
+def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the figures of a diagnosis by file name."""
+    figures: dict[str, Any] = {}
+    pictures = analysis["pictures"]
+    for name, curves in pictures["signals"].items():
+        label = style.label(name, SIGNAL_UNITS.get(name, "1"))
+        figures[f"pulses_{name}"] = figures_of.draw_pulses(curves, label)
+    labels = {name: style.words(name) for name in pictures["signals"]}
+    regime = analysis["where"]["regime"]
+    if labels:
+        unit = "m/s" if regime == "impact_speed" else "1"
+        figures["where"] = figures_of.draw_map(
+            analysis["where"], labels, style.label(regime, unit) if regime else "tests"
+        )
+    if any(pictures["scalars"].values()):
+        names = {name: style.words(name) for name in pictures["scalars"]}
+        figures["scalars"] = figures_of.draw_scalars(pictures["scalars"], names)
+    if analysis["effects"]:
+        figures["evidence"] = figures_of.draw_evidence(analysis["effects"])
+    known = _scores(analysis)
+    if any(g["score"] in known for g in analysis["gain"]):
+        figures["gain"] = figures_of.draw_gain(analysis["gain"], known)
+    if analysis["conclusions"]:
+        parts = analysis["conclusions"]
+        figures["conclusions"] = figures_of.draw_conclusions(
+            parts["base"], parts["extended"], style.label("hic15")
+        )
+    return figures
+
+
+def _scores(analysis: Mapping[str, Any]) -> dict[str, str]:
+    found = dict(SCORES)
+    for name in analysis["pictures"]["scalars"]:
+        found.setdefault(f"crps_{name}", f"CRPS of {style.words(name)}")
+    return found
+
+
+def sections_of(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list[Section]:
+    """Return the sections of the report."""
+    sections = [Section("What was found", summarise(analysis), [])]
+    captions = {
+        f"Measured and simulated {style.words(name)}: each test as recorded, bands of 95 % from "
+        "what is uncertain about a test.": figures[f"pulses_{name}"]
+        for name in analysis["pictures"]["signals"]
+    }
+    if "scalars" in figures:
+        captions["Measured against simulated scalars."] = figures["scalars"]
+    if "where" in figures:
+        captions["Where measured and simulated differ, everything uncertain allowed for."] = (
+            figures["where"]
+        )
+    place = words.location(analysis["where"], SIGNAL_UNITS)
+    sections.append(Section("Where", [place], [], captions))
+    if analysis["effects"]:
+        sections.append(_why(analysis, figures))
+    if analysis["gain"]:
+        sections.append(_gain(analysis, figures))
+    sections.append(_visible(analysis))
+    sections.append(Section("How it was done", _method(analysis), [_statistics(analysis)]))
+    return sections
+
+
+def summarise(analysis: Mapping[str, Any]) -> list[str]:
+    """Return the answer in words."""
+    lines = words.answer(analysis)
+    lines += words.gain_words(analysis["gain"])
+    lines += words.conclusion_words(analysis["conclusions"])
+    if analysis["model"]["extended"]:
+        lines.append(
+            f"The extended model is in {analysis['model']['extended']}; 'mcstudy run' takes it."
+        )
+    if analysis["worth"]:
+        lines.append(_best_extra(analysis))
+    return lines
+
+
+def _best_extra(analysis: Mapping[str, Any]) -> str:
+    best = analysis["worth"][0]
+    if analysis["ambiguous"] and best["separation"] is not None:
+        return (
+            f"What would help most: {best['title']}; the causes named would then differ by "
+            f"{number(best['separation'], 2)} log units."
+        )
+    return (
+        f"What would help most: {best['title']}; causes would be seen "
+        f"{number(best['visibility'], 2)} times as clearly, on average over the catalogue."
+    )
+
+
+def _why(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> Section:
+    rows = []
+    for row in analysis["effects"]:
+        values = ", ".join(
+            f"{p['name'].replace('_', ' ')} {words.shown(p)}"
+            for p in row["parameters"]
+            if not p.get("fixed")
+        )
+        rows.append(
+            [row["name"].replace("_", " "), number(row["log_evidence"]), row["form"], values]
+        )
+    table = Table(
+        "Causes by evidence above the model as it stands, in natural log units, averaged over the "
+        "forms of a cause; parameters of the best form with 95 % half-widths.",
+        ["cause", "log evidence", "best form", "parameters"],
+        rows,
+    )
+    lines = [
+        "Every cause of the catalogue was fitted with all uncertain inputs, in each of its forms. "
+        "Causes within 3 log units of the best cannot be told apart; below 3 log units none is "
+        "named."
+    ]
+    left = analysis["remainder"]
+    if left is not None:
+        lines.append(
+            f"The best cause explains {100.0 * left['share']:.0f} % of the misfit; what is left "
+            f"has {words.probability(left['p_value'])}."
+        )
+    return Section("Why", lines, [table], {"Evidence of each cause.": figures["evidence"]})
+
+
+def _gain(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> Section:
+    rows = []
+    for g in analysis["gain"]:
+        d, p = g["difference"], g["against_process"]
+        rows.append(
+            [g["score"].replace("_", " "), g["region"], *(number(g[k]) for k in (
+                "base", "extended", "gaussian_process")),
+             f"{number(d['value'])} ({number(d['low'])} to {number(d['high'])})",
+             f"{number(p['value'])} ({number(p['low'])} to {number(p['high'])})"]
+        )  # fmt: skip
+    table = Table(
+        "Scores of held-out tests; the log score is better when larger, all others when smaller. "
+        "Differences are positive where the extended model is better, with 95 % bootstrap "
+        "intervals over tests.",
+        ["score", "region", "base", "extended", "Gaussian process", "better than base",
+         "better than the process"],
+        rows,
+    )  # fmt: skip
+    shown = {}
+    if "gain" in figures:
+        shown["Gain on held-out tests, with 95 % intervals."] = figures["gain"]
+    if "conclusions" in figures:
+        shown["What the extension changes in the study's conclusions."] = figures["conclusions"]
+    lines = [
+        "Whole tests were held out, a sixth at a time (inside), and the fastest quarter at once "
+        "(beyond). The Gaussian process corrects the base model's pulses without naming a cause."
+    ]
+    return Section("What the extension gains", lines, [table], shown)
+
+
+def _visible(analysis: Mapping[str, Any]) -> Section:
+    rows = [
+        [e["cause"].replace("_", " "), e["parameter"].replace("_", " "), words.visible_words(e)]
+        for e in analysis["visible"]
+    ]
+    tables = [
+        Table(
+            "Smallest size of each cause that these tests would have shown with 80 % power.",
+            ["cause", "parameter", "smallest size"],
+            rows,
+        )
+    ]
+    if analysis["worth"]:
+        tables.append(
+            Table(
+                "Measurements that could be added: how far the causes named would stand apart, and "
+                "how much more clearly causes would be seen.",
+                ["measurement", "separation [log units]", "clearer by the factor"],
+                [[w["title"], number(w["separation"], 2), number(w["visibility"], 3)]
+                 for w in analysis["worth"]],
+            )
+        )  # fmt: skip
+    return Section("What could have been seen", [], tables)
+
+
+def _statistics(analysis: Mapping[str, Any]) -> Table:
+    rows = [
+        [name, number(entry["value"]), number(entry["p_value"], 2)]
+        for name, entry in analysis["statistics"].items()
+    ]
+    return Table(
+        "Four ways of looking for a misfit; the smallest p-value is calibrated on data that the "
+        "model makes.",
+        ["kind of misfit", "statistic", "p-value"],
+        rows,
+    )
+
+
+def _method(analysis: Mapping[str, Any]) -> list[str]:
+    r = analysis["repeatability"]
+    return [
+        "The model was fitted with everything that is uncertain: shared unknowns, recorded inputs "
+        "within their uncertainty, time origin and offset of each test, and a repeatability of the "
+        f"pulse from test to test ({100.0 * r['level']:.1f} % of its level, "
+        f"{100.0 * r['shape']:.1f} % of its shape).",
+        "With the signs of whole tests flipped instead of a covariance the catalogue's p-value is "
+        f"{number(analysis['flip_p_value'], 2)}; it cannot be small where few tests carry the "
+        "misfit.",
+    ]
+
+
+def table_of(analysis: Mapping[str, Any]) -> list[Table]:
+    """Return what the command line prints beside the sentences."""
+    if not analysis["effects"]:
+        return [_visible(analysis).tables[0]]
+    return [
+        Table(
+            "Causes by evidence",
+            ["cause", "log evidence", "form"],
+            [[e["name"], number(e["log_evidence"]), e["form"]] for e in analysis["effects"][:6]],
+        )
+    ]

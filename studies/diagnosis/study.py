@@ -1,0 +1,198 @@
+"""Diagnosis of a model against measured tests, from a folder of data to a report."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcstudy.diagnosis.fit import Fit
+from mcstudy.diagnosis.gain import Gain, Quantity, measure_gain
+from mcstudy.diagnosis.naming import Candidate
+from mcstudy.diagnosis.power import smallest_visible, worth_of
+from mcstudy.diagnosis.problem import Cause, Problem
+from mcstudy.diagnosis.regions import locate_misfit
+from mcstudy.diagnosis.search import Finding, search
+from mcstudy.errors import UserError
+from mcstudy.measured import Measured, load_measured
+from mcstudy.progress import say
+from mcstudy.results import ResultsFolder
+from models.criteria import head_injury_criterion
+from studies.diagnosis import conclusions, extension, pictures
+from studies.diagnosis.catalogue import causes_of
+from studies.diagnosis.extras import extras_of
+from studies.diagnosis.model_choice import ModelChoice, choose_model
+from studies.diagnosis.posterior import describe
+from studies.diagnosis.problem import build_problem
+from studies.diagnosis.report import draw, sections_of, subtitle_of
+from studies.diagnosis.simulation import Simulation
+from studies.execution import publish
+
+Array = NDArray[np.float64]
+
+ANSWER = "diagnosis.json"
+EXTENDED = "extended.toml"
+BASE = "base.toml"
+RIVALS = 3
+"""Rivals of the best cause from which extra measurements are to tell it."""
+
+
+def diagnose(
+    source: Path | str,
+    folder: ResultsFolder,
+    *,
+    model_config: Path | None = None,
+    seed: int = 0,
+    workers: int = -1,
+    quiet: bool = True,
+) -> dict[str, Any]:
+    """Diagnose a model against measured tests and write a folder with the answer and a report.
+
+    Parameters
+    ----------
+    source : folder of measured data or of ISO-MME tests.
+    folder : where the diagnosis goes.
+    model_config : study file whose model is diagnosed; by default the model that the data name.
+    seed : of the simulated data sets. workers : processes, -1 for one a core.
+    quiet : print no progress.
+
+    Returns
+    -------
+    dict
+        The answer, as in ``diagnosis.json``.
+
+    Raises
+    ------
+    UserError
+        If the data or the model are wrong, or do not fit each other.
+    """
+    data = load_measured(source)
+    if folder.path.resolve() == data.source.resolve():
+        raise UserError(f"{folder.path}: holds the measured data; choose another --out")
+    choice = choose_model(data, model_config)
+    simulation = simulation_of(data, choice)
+    problem = build_problem(data, choice, simulation)
+    causes = tuple(c for c in causes_of(choice.name) if c.name not in choice.effects)
+    say(f"{len(problem.tests)} tests, {len(causes)} causes", quiet=quiet)
+    finding = search(problem, causes, seed=seed, workers=workers)
+    say(finding.why, quiet=quiet)
+    with folder.open_for_writing():
+        return _write(data, choice, problem, simulation, causes, finding, folder, seed, quiet)
+
+
+def simulation_of(data: Measured, choice: ModelChoice) -> Simulation:
+    """Return the simulation of what was measured."""
+    filters = {name: entry.channel_class for name, entry in data.header.signals.items()}
+    return Simulation(
+        choice.name, choice.options, filters, list(data.header.scalars), choice.effects
+    )
+
+
+def _write(
+    data: Measured,
+    choice: ModelChoice,
+    problem: Problem,
+    simulation: Simulation,
+    causes: tuple[Cause, ...],
+    finding: Finding,
+    folder: ResultsFolder,
+    seed: int,
+    quiet: bool,
+) -> dict[str, Any]:
+    """Write the folder of a finding and return the answer."""
+    layouts = finding.layouts
+    where = locate_misfit(finding.base, layouts)
+    visible = smallest_visible(problem, layouts, finding.base, causes, finding.screening.threshold)
+    believed = finding.best or finding.base
+    near = [c for c in finding.candidates[1:] if c.cause.name in finding.ambiguous][:RIVALS]
+    worth = worth_of(
+        problem, layouts, believed, [c.fitted for c in near], causes, extras_of(problem, simulation)
+    )
+    gains: list[Gain] = []
+    text = extension.base_study(data, choice, problem, folder.path.name)
+    folder.write_text(BASE, text)
+    before = after = None
+    if finding.best is not None:
+        say("measuring the gain", quiet=quiet)
+        gains = measure_gain(problem, layouts, finding.base, finding.best, quantities(data), seed)
+        longer = extension.checked(extension.extend(text, problem, finding.best))
+        folder.write_text(EXTENDED, longer)
+        before, after = conclusions.conclude(text), conclusions.conclude(longer)
+    answer = {
+        "format": "mcstudy-diagnosis/1",
+        "data": {"title": data.header.title, "tests": len(problem.tests), "model": choice.name},
+        "adequate": finding.adequate,
+        "p_value": finding.screening.p_value,
+        "flip_p_value": finding.screening.flip_p_value,
+        "statistics": {
+            s.name: {"value": s.value, "p_value": s.p_value} for s in finding.screening.statistics
+        },
+        "cause": finding.cause,
+        "ambiguous": list(finding.ambiguous),
+        "second_cause": None if finding.second is None else finding.second.cause.name,
+        "second_ambiguous": list(finding.second_ambiguous),
+        "why": finding.why,
+        "remainder": None if finding.remainder is None else asdict(finding.remainder),
+        "drift": {"name": finding.screening.drift[0], "log_evidence": finding.screening.drift[1]},
+        "repeatability": asdict(believed.scatter),
+        "effects": [_effect(problem, c, finding) for c in finding.candidates],
+        "titles": {cause.name: cause.title for cause in causes},
+        "separated_by": {cause.name: cause.separated_by for cause in causes},
+        "model": {"extended": EXTENDED if finding.best is not None else None, "base": BASE},
+        "parameters": _parameters(problem, finding.best),
+        "gain": [asdict(entry) for entry in gains],
+        "conclusions": None
+        if before is None or after is None
+        else {"base": conclusions.as_dict(before), "extended": conclusions.as_dict(after)},
+        "visible": [asdict(entry) for entry in visible],
+        "worth": [asdict(entry) for entry in worth],
+    }
+    folder.write_json(ANSWER, answer)
+    analysis = answer | {
+        "where": asdict(where) | {"largest": asdict(where.largest)},
+        "pictures": pictures.collect(problem, layouts, finding.base, finding.best),
+    }
+    publish(
+        folder, f"Diagnosis: {data.header.title}", subtitle_of(answer), analysis, draw, sections_of
+    )
+    read: dict[str, Any] = folder.read_json(ANSWER)
+    return read
+
+
+def _effect(problem: Problem, candidate: Candidate, finding: Finding) -> dict[str, Any]:
+    """Return a candidate as plain data."""
+    return {
+        "name": candidate.cause.name,
+        "title": candidate.cause.title,
+        "log_evidence": candidate.log_evidence,
+        "form": candidate.form.name,
+        "forms": candidate.forms,
+        "parameters": describe(problem, candidate.fitted, candidate.cause.name),
+        "ambiguous": candidate.cause.name in finding.ambiguous,
+    }
+
+
+def _parameters(problem: Problem, best: Fit | None) -> dict[str, list[dict[str, Any]]]:
+    """Return the fitted parameters of the causes that extend the model."""
+    if best is None:
+        return {}
+    return {form.cause: describe(problem, best, form.cause) for form in best.forms}
+
+
+def quantities(data: Measured) -> Mapping[str, tuple[str, str, Quantity]]:
+    """Return what is computed of the signals to score predictions: unit, signal, function."""
+    found: dict[str, tuple[str, str, Quantity]] = {}
+    if "head_acceleration" in data.header.signals:
+        found["hic15"] = ("1", "head_acceleration", _hic15)
+        found["peak_head_acceleration"] = ("g", "head_acceleration", _peak)
+    return found
+
+
+def _hic15(time: Array, values: Array) -> float:
+    return float(head_injury_criterion(time, np.maximum(values, 0.0), 0.015)[0])
+
+
+def _peak(_time: Array, values: Array) -> float:
+    return float(values.max())

@@ -1,0 +1,166 @@
+"""A diagnosis in plain words."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from mcstudy.figures.style import words
+from mcstudy.text import capital, interval, number, percent, quantity, unit
+
+SHOWN_UNITS = {"m": ("mm", 1e3), "rad": ("deg", 57.29577951308232), "m/N": ("mm/kN", 1e6),
+               "N/m": ("kN/m", 1e-3), "N": ("kN", 1e-3)}  # fmt: skip
+"""Units in which people read parameters, and their factor."""
+
+SENTENCES = {
+    "hood_bottoming": "The hood hits something {clearance} below it.",
+    "hood_yield": "The hood yields beyond {force}.",
+    "rate_dependent_hood": "The hood is stiffer when struck faster.",
+    "hood_inertia": "The hood's own mass, {mass}, is set in motion.",
+    "unloading_slope": "The hood springs back otherwise than assumed: factor {factor} on its "
+    "unloading slope.",
+    "skin_compliance": "The headform's skin gives way by {compliance}.",
+    "hood_force_scale": "The forces are {factor} times those of the hood's curve.",
+    "sensor_gain": "The accelerometer reads {factor} times the true acceleration.",
+    "sensor_offset": "The accelerometer is off zero by {offset}.",
+    "sensor_saturation": "The accelerometer does not read beyond {limit}.",
+    "sensor_filter": "The signal went through channel frequency class {channel_class}, not the one "
+    "stated.",
+    "time_scale": "The recorder's clock shows {factor} times the true time.",
+    "speed_bias": "The true impact speed is {factor} times the recorded one.",
+    "mass_error": "The true mass is {factor} times the recorded one.",
+    "wet_road": "Beyond {place} the road is slippery: {factor} of the friction before it.",
+    "late_braking": "The car brakes {delay} after first contact.",
+    "road_slope": "The road falls by {angle} along the travel.",
+    "muscle_tone": "The muscles were tensed: {factor} times the resistance of neck and joints.",
+    "shoulder_compliance": "Shoulder and chest give way {factor} times as far.",
+    "braced_posture": "The person was braced, {share} of the way.",
+    "brake_dive": "The nose dives {angle} more than assumed.",
+    "restitution": "The road gives back {factor} times the energy assumed.",
+}
+
+
+def shown(row: Mapping[str, Any]) -> str:
+    """Return a parameter with its interval, in the unit in which people read it."""
+    name, factor = SHOWN_UNITS.get(row.get("unit", "1"), (row.get("unit", "1"), 1.0))
+    value, low, high = (factor * float(row[key]) for key in ("value", "low", "high"))
+    half = 0.5 * (high - low)
+    text = f"{number(value)} ± {number(half, 2)}" if half > 0.0 else number(value)
+    return f"{text} {unit(name)}".strip()
+
+
+def sentence(cause: str, parameters: Sequence[Mapping[str, Any]], title: str) -> str:
+    """Return what a named cause says, with its fitted numbers."""
+    pattern = SENTENCES.get(cause)
+    if pattern is None:
+        return f"{capital(title)}."
+    return pattern.format(**{row["name"]: shown(row) for row in parameters})
+
+
+def probability(p: float) -> str:
+    """Return a p-value."""
+    return "p < 0.001" if p < 0.0015 else f"p = {number(p, 2)}"
+
+
+def answer(found: Mapping[str, Any]) -> list[str]:
+    """Return the answer in a few sentences."""
+    p = probability(found["p_value"])
+    tests = found["data"]["tests"]
+    if found["adequate"]:
+        return [
+            f"The model explains the {tests} tests within what is uncertain ({p}). What follows "
+            "says what could have been seen."
+        ]
+    lines = [f"The model does not explain the {tests} tests ({p})."]
+    titles = found["titles"]
+    if found["cause"] == "unexplained":
+        lines.append(f"No cause of the catalogue explains it: {found['why']}.")
+        if found["drift"]["log_evidence"] > 3.0:
+            lines.append(f"Look for a slow change: {_drift(found['drift']['name'])}.")
+        return lines
+    parameters = found["parameters"]
+    lines += [sentence(cause, rows, titles[cause]) for cause, rows in parameters.items()]
+    if found["ambiguous"]:
+        others = [titles[name] for name in found["ambiguous"] if name != found["cause"]]
+        lines.append(
+            f"But the data cannot tell this from: {'; '.join(others)}. What would: "
+            f"{found['separated_by'][found['cause']]}."
+        )
+    if found["second_ambiguous"]:
+        names = [titles[n] for n in found["second_ambiguous"] if n != found["second_cause"]]
+        lines.append(f"The second cause cannot be told from: {'; '.join(names)}.")
+    if "something remains" in found["why"]:
+        lines.append("Something remains that this does not explain.")
+    return lines
+
+
+def _drift(name: str) -> str:
+    nuisance, _, covariate = name.partition(" with ")
+    kind, _, channel = nuisance.partition(":")
+    what = {"pulse": "the pulse", "offset": f"the offset of {words(channel)}",
+            "time_origin": "the time origin", "scatter": words(channel)}  # fmt: skip
+    along = "the order of the tests" if covariate == "order" else words(covariate)
+    return f"{what.get(kind, words(nuisance))} changes with {along}"
+
+
+def location(where: Mapping[str, Any], units: Mapping[str, str]) -> str:
+    """Return where the misfit is, in a sentence."""
+    region = where["largest"]
+    more = "above" if region["z"] > 0.0 else "below"
+    when = ""
+    if region["end"] > region["begin"] and region["channel"] in units:
+        when = f" from {1e3 * region['begin']:.1f} to {1e3 * region['end']:.1f} ms of the pulse"
+    tests = ""
+    if where["regime"]:
+        low, high = region["low"], region["high"]
+        tests = f", tests with {words(where['regime'])} {number(low)} to {number(high)}"
+        tests += " m/s" if where["regime"] == "impact_speed" else ""
+    return (
+        f"Measured and simulated differ most in {words(region['channel'])}{when}{tests}: measured "
+        f"lies {100.0 * abs(region['size']):.1f} % of the peak {more} simulated "
+        f"({abs(region['z']):.1f} standard errors)."
+    )
+
+
+def gain_words(gains: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return what the extension gains on held-out tests."""
+    lines = []
+    for score, name in (("crps_hic15", "HIC15"), ("crps_peak_head_acceleration", "the peak")):
+        for entry in gains:
+            if entry["score"] != score or not entry["base"]:
+                continue
+            scale = 100.0 / entry["base"]
+            d = entry["difference"]
+            lines.append(
+                f"{capital(entry['region'])} the speeds used, predictions of {name} are "
+                f"{scale * d['value']:.0f} % better (CRPS, {scale * d['low']:.0f} to "
+                f"{scale * d['high']:.0f} %)."
+            )
+    return lines
+
+
+def conclusion_words(found: Mapping[str, Any] | None) -> list[str]:
+    """Return what the extension changes in the study's conclusions."""
+    if found is None:
+        return []
+    base, extended = found["base"], found["extended"]
+    limit = f"{base['limit']:g}"
+
+    def first(part: Mapping[str, Any]) -> str:
+        return words(max(part["drivers"], key=lambda n: part["drivers"][n]["value"]))
+
+    return [
+        f"P(HIC15 > {limit}): {percent(base['exceedance'])} with the model as it stands, "
+        f"{percent(extended['exceedance'])} with the extended one; median HIC15 "
+        f"{interval(base['median'])} and {interval(extended['median'])}.",
+        f"What drives HIC15 most: {first(base)} before, {first(extended)} after.",
+    ]
+
+
+def visible_words(entry: Mapping[str, Any]) -> str:
+    """Return the smallest size of a cause that would have been seen."""
+    value, none = entry["value"], entry["none"]
+    if value is None:
+        return "no size within the prior"
+    name, factor = SHOWN_UNITS.get(entry["unit"], (entry["unit"], 1.0))
+    if none == 1.0 and entry["unit"] == "1":
+        return f"{100.0 * abs(value - 1.0):.2g} %"
+    return quantity(factor * value, name)

@@ -1,0 +1,1 @@
+"""Validation of the diagnosis: effects are hidden in data and must be found."""

@@ -1,0 +1,146 @@
+"""One trial: effects are hidden in a set of tests, the set is diagnosed, and the answer judged.
+
+The finder sees the folder of tests only. What was hidden is drawn from a seed that it never gets,
+and is compared with its answer after it has ended.
+"""
+
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcstudy.diagnosis.fit import Fit
+from mcstudy.diagnosis.layout import Layout
+from mcstudy.diagnosis.marginal import Marginal
+from mcstudy.diagnosis.problem import Problem
+from mcstudy.diagnosis.screening import POWER
+from mcstudy.diagnosis.search import UNEXPLAINED, Finding, fit_base, search
+from mcstudy.measured import load_measured
+from studies.diagnosis.catalogue import causes_of
+from studies.diagnosis.model_choice import choose_model
+from studies.diagnosis.problem import build_problem
+from studies.diagnosis.study import simulation_of
+from studies.validation.diagnosis.drawing import draw
+from studies.validation.diagnosis.hidden_effects import Hidden, Laboratory, make_tests
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What is tried: seed, kind of set, whether load cell and rebound speed were recorded."""
+
+    seed: int
+    kind: str
+    force: bool
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a trial.
+
+    Attributes
+    ----------
+    trial : Trial. hidden : what was hidden, ``effect (form)``. names : of the effects.
+    size : of the whole effect over the smallest that is seen with 80 % power.
+    p_value, cause, ambiguous, second, second_ambiguous : of the answer. why : in words.
+    seconds : that the search took.
+    """
+
+    trial: Trial
+    hidden: tuple[str, ...]
+    names: tuple[str, ...]
+    size: float
+    p_value: float
+    cause: str | None
+    ambiguous: tuple[str, ...]
+    second: str | None
+    second_ambiguous: tuple[str, ...]
+    flagged: bool
+    why: str
+    seconds: float
+
+    @property
+    def detected(self) -> bool:
+        """Whether the model was called inadequate."""
+        return self.cause is not None
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """The names that the answer gives, ambiguous ones included."""
+        if self.cause in (None, UNEXPLAINED):
+            return ()
+        assert self.cause is not None
+        first = self.ambiguous or (self.cause,)
+        second = self.second_ambiguous or ((self.second,) if self.second else ())
+        return (*first, *second)
+
+
+def run_trial(trial: Trial, workers: int = 1) -> Outcome:
+    """Return what comes of a trial."""
+    laboratory = Laboratory(force=trial.force, rebound=trial.force)
+    hidden = draw(trial.seed, trial.kind)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / "tests"
+        make_tests(folder, hidden, trial.seed, laboratory)
+        problem = _problem(folder)
+        start = time.perf_counter()
+        finding = search(problem, causes_of("headform"), seed=trial.seed, workers=workers)
+        seconds = time.perf_counter() - start
+        size = _size(Path(scratch), hidden, trial.seed, laboratory, finding) if hidden else 0.0
+    return Outcome(
+        trial=trial,
+        hidden=tuple(f"{h.name} ({h.form or 'one form'})" for h in hidden),
+        names=tuple(h.name for h in hidden),
+        size=size,
+        p_value=finding.screening.p_value,
+        cause=finding.cause,
+        ambiguous=finding.ambiguous,
+        second=None if finding.second is None else finding.second.cause.name,
+        second_ambiguous=finding.second_ambiguous,
+        flagged="something remains" in finding.why,
+        why=finding.why,
+        seconds=seconds,
+    )
+
+
+def _problem(folder: Path) -> Problem:
+    data = load_measured(folder)
+    choice = choose_model(data, None)
+    return build_problem(data, choice, simulation_of(data, choice))
+
+
+def _size(
+    scratch: Path, hidden: Sequence[Hidden], seed: int, laboratory: Laboratory, finding: Finding
+) -> float:
+    """Return the size of an effect over the smallest that would be seen.
+
+    Two sets of the same tests, one with the effect and one without, both without noise: their
+    difference, all nuisances integrated out, in standard errors over those needed.
+    """
+    quiet = replace(laboratory, noise_sd=0.0, scatter=0.0, speed_sd=0.0)
+    for name, effects in (("with", hidden), ("without", ())):
+        make_tests(scratch / name, effects, seed, quiet, header_of=laboratory)
+    twin, plain = _problem(scratch / "with"), _problem(scratch / "without")
+    layouts, fitted = fit_base(plain)
+    columns = [_difference(layout, i, twin, fitted)[:, None] for i, layout in enumerate(layouts)]
+    # The repeatability of the real set, not that of its noise-free twin.
+    marginal = Marginal(fitted, layouts, columns)
+    reduced = marginal.reduce(marginal.measured(), finding.base.scatter)
+    strength = float(np.sqrt(reduced.information[0, 0]))
+    return strength / (finding.screening.threshold + POWER)
+
+
+def _difference(layout: Layout, row: int, twin: Problem, fitted: Fit) -> Array:
+    """Return the whitened change that an effect makes of one test."""
+    parts = []
+    for signal, other in zip(layout.test.signals, twin.tests[row].signals, strict=True):
+        change = np.interp(signal.time, other.time, other.values) - signal.values
+        parts.append(change / signal.sd)
+    for scalar, other_scalar in zip(layout.test.scalars, twin.tests[row].scalars, strict=True):
+        parts.append(np.array([(other_scalar.value - scalar.value) / scalar.sd]))
+    return np.concatenate(parts)

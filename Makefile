@@ -4,10 +4,10 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install study case test check benchmark gallery calibrate lock clean
+.PHONY: help install study diagnose-demo case test check benchmark gallery calibrate lock clean
 
 help:  ## list the targets
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/  make \1\t\2/' | expand -t 18
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 18
 
 $(INSTALLED): requirements.lock pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "mcstudy needs Python 3.11 or newer: make PYTHON=python3.12 ...")'
@@ -21,6 +21,9 @@ install: $(INSTALLED)  ## install everything, locked, into .venv
 study: install  ## run the main job: the nominal case and the Monte Carlo study of it
 	$(BIN)/mcstudy reconstruct configs/paper_case.toml
 	$(BIN)/mcstudy run configs/paper_study.toml
+
+diagnose-demo: install  ## hide an effect in tests, find it, extend the model, run the injury study again
+	$(BIN)/python -m studies.diagnosis.demo
 
 case: install  ## run the nominal case only
 	$(BIN)/mcstudy reconstruct configs/paper_case.toml

@@ -72,7 +72,7 @@ class Layout:
             *(("time_origin",) if self.test.signals else ()),
             *(f"offset:{signal.name}" for signal in self.test.signals),
             *(f"pulse:{k}" for k in range(MODES) if self.test.signals),
-            *(f"scatter:{scalar.name}" for scalar in self.test.scalars),
+            *(f"scatter:{scalar.name}" for scalar in self.test.scalars if scalar.scatters),
         )
 
     @functools.cached_property
@@ -82,7 +82,8 @@ class Layout:
 
     def scatter_sizes(self, scatter: Scatter) -> Array:
         """Return the sizes of the nuisances that are repeatability, in order."""
-        return scatter.sizes(MODES if self.test.signals else 0, len(self.test.scalars))
+        scalars = sum(scalar.scatters for scalar in self.test.scalars)
+        return scatter.sizes(MODES if self.test.signals else 0, scalars)
 
     @functools.cached_property
     def _modes(self) -> tuple[Array, ...]:
@@ -214,16 +215,18 @@ class Layout:
                     table[:, 1 + k] = signal.sd
                     table[:, 1 + signals : 1 + signals + MODES] = sizes * modes * shape[:, None]
                     slopes.append(_whiten(table, signal.sd, signal.correlation))
-        first = own - len(test.scalars)
-        for k, scalar in enumerate(test.scalars):
+        column = own - sum(scalar.scatters for scalar in test.scalars)
+        for scalar in test.scalars:
             value = seen.scalars[scalar.name]
-            simulated_value = value * (1.0 + scatter.level * scores[start + first + k])
+            off = scatter.level * scores[start + column] if scalar.scatters else 0.0
             given = scalar.value if measured else 0.0
-            parts.append(np.array([(given - simulated_value) / scalar.sd]))
+            parts.append(np.array([(given - value * (1.0 + off)) / scalar.sd]))
             if slope:
                 row = np.zeros((1, own))
-                row[0, first + k] = scatter.level * value / scalar.sd
+                if scalar.scatters:
+                    row[0, column] = scatter.level * value / scalar.sd
                 slopes.append(row)
+            column += scalar.scatters
         return np.concatenate(parts), np.concatenate(slopes) if slope else None
 
 

@@ -44,11 +44,18 @@ class Signal:
 
 @dataclass(frozen=True)
 class Scalar:
-    """A measured scalar, its standard uncertainty, in the model's unit."""
+    """A measured scalar in the model's unit.
+
+    Attributes
+    ----------
+    name : as the model calls it. value, sd : with its standard uncertainty, infinite if missing.
+    scatters : whether it has a repeatability from test to test beside that.
+    """
 
     name: str
     value: float
     sd: float
+    scatters: bool = True
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,11 @@ def causes_of(model: str) -> tuple[Cause, ...]:
     return tuple(_cause(load_effect(name)) for name in effects_of(model))
 
 
+def stage_of(cause: str) -> str:
+    """Return the stage of a run at which a cause acts."""
+    return load_effect(cause).stage
+
+
 def _cause(effect: Effect) -> Cause:
     forms = tuple(
         Form(

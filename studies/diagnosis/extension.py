@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 
 from mcstudy.config import InjuryStudy, MonteCarloStudy, SobolStudy, parse_study
-from mcstudy.diagnosis.fit import Fit
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.measured import Measured
+from mcstudy.statistics import REACH
 from models.registry import load_model
 from studies.diagnosis.model_choice import ModelChoice
-from studies.diagnosis.posterior import posteriors
 
 RUNS, REPLICATE = 1000, 100
 """Runs of a study file that is made from data alone."""
@@ -59,22 +58,35 @@ def base_study(data: Measured, choice: ModelChoice, problem: Problem, name: str)
     return "\n".join(lines) + "\n"
 
 
-def extend(text: str, problem: Problem, fitted: Fit) -> str:
-    """Return a study file with the causes of a fit switched on, their parameters uncertain."""
+Parameters = Mapping[str, Sequence[Mapping[str, Any]]]
+"""By cause its fitted parameters, as in ``diagnosis.json``."""
+
+
+def extend(text: str, parameters: Parameters) -> str:
+    """Return a study file with causes switched on, their fitted parameters uncertain."""
     lines = ["", "# What the diagnosis added: effects, and what the tests say of their parameters."]
-    for form in fitted.forms:
-        lines += [f"[effects.{form.cause}]"]
-        lines += [f"{name} = {value!r}" for name, value in form.fixed.items()]
-        lines += [
-            f"{entry.parameter.name} = {entry.median!r}"
-            for entry in posteriors(problem, fitted)
-            if entry.cause == form.cause
-        ]
-        lines += [""]
-    for entry in posteriors(problem, fitted):
-        name = f"{entry.cause}_{entry.parameter.name}"
-        lines += [*_input(name, entry.distribution(), entry.parameter.unit)[1:], ""]
-    return text.rstrip("\n") + "\n" + "\n".join(lines).rstrip("\n") + "\n"
+    for cause, rows in parameters.items():
+        lines += ["", f"[effects.{cause}]"]
+        lines += [f"{row['name']} = {float(row['value'])!r}" for row in rows]
+    for cause, rows in parameters.items():
+        for row in rows:
+            if not row["fixed"]:
+                lines += _input(f"{cause}_{row['name']}", _distribution(row), row["unit"])
+    return text.rstrip("\n") + "\n" + "\n".join(lines) + "\n"
+
+
+def _distribution(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the distribution of a fitted parameter as a table of a study file."""
+    value, low, high = (float(row[key]) for key in ("value", "low", "high"))
+    narrow = 1e-6 * abs(value) + 1e-12
+    if row["family"] == "lognormal":
+        sigma = max(float(np.log(high / low)) / (2.0 * REACH), 1e-6)
+        return {"distribution": "lognormal", "median": value, "sigma": sigma}
+    table: dict[str, Any] = {"distribution": "normal", "mean": value}
+    table["sd"] = max((high - low) / (2.0 * REACH), narrow)
+    if row["family"] == "uniform":
+        table |= {"low": low - narrow, "high": high + narrow}
+    return table
 
 
 def checked(text: str) -> str:

@@ -182,10 +182,15 @@ def _test(
 def _scalars(data: Measured, model: Model, row: int) -> list[Scalar]:
     place = data.source / HEADER
     outputs = {item.name: item.unit for item in model.outputs}
+    if not data.header.signals:
+        outputs["ais"] = "1"
     found = []
     for name, entry in data.header.scalars.items():
         if name not in outputs:
-            raise UserError(f"{place}: scalars.{name}: the model has no such output")
+            raise UserError(
+                f"{place}: scalars.{name}: the model has no such output; it has "
+                f"{', '.join(outputs)}"
+            )
         try:
             scale = units.factor(entry.unit, outputs[name])
         except ValueError as error:

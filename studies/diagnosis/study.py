@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.fit import Fit
 from mcstudy.diagnosis.gain import Gain, Quantity, measure_gain
 from mcstudy.diagnosis.naming import Candidate
 from mcstudy.diagnosis.power import smallest_visible, worth_of
@@ -21,7 +20,9 @@ from mcstudy.progress import say
 from mcstudy.results import ResultsFolder
 from models.criteria import head_injury_criterion
 from studies.diagnosis import conclusions, extension, pictures
-from studies.diagnosis.catalogue import causes_of
+from studies.diagnosis.accidents import build_collection, is_collection
+from studies.diagnosis.catalogue import causes_of, stage_of
+from studies.diagnosis.emulator import Emulator
 from studies.diagnosis.extras import extras_of
 from studies.diagnosis.model_choice import ModelChoice, choose_model
 from studies.diagnosis.posterior import describe
@@ -76,10 +77,16 @@ def diagnose(
     problem = build_problem(data, choice, simulation)
     causes = tuple(c for c in causes_of(choice.name) if c.name not in choice.effects)
     say(f"{len(problem.tests)} tests, {len(causes)} causes", quiet=quiet)
+    source_of_extras: Simulation | Emulator = simulation
+    if is_collection(data):
+        causes = tuple(c for c in causes if stage_of(c.name) != "signal")
+        problem, source_of_extras = build_collection(
+            problem, data, choice, causes, seed=seed, workers=workers, quiet=quiet
+        )
     finding = search(problem, causes, seed=seed, workers=workers)
     say(finding.why, quiet=quiet)
     with folder.open_for_writing():
-        return _write(data, choice, problem, simulation, causes, finding, folder, seed, quiet)
+        return _write(data, choice, problem, source_of_extras, causes, finding, folder, seed, quiet)
 
 
 def simulation_of(data: Measured, choice: ModelChoice) -> Simulation:
@@ -94,7 +101,7 @@ def _write(
     data: Measured,
     choice: ModelChoice,
     problem: Problem,
-    simulation: Simulation,
+    simulation: Simulation | Emulator,
     causes: tuple[Cause, ...],
     finding: Finding,
     folder: ResultsFolder,
@@ -117,7 +124,7 @@ def _write(
     if finding.best is not None:
         say("measuring the gain", quiet=quiet)
         gains = measure_gain(problem, layouts, finding.base, finding.best, quantities(data), seed)
-        longer = extension.checked(extension.extend(text, problem, finding.best))
+        longer = extension.checked(extension.extend(text, describe(problem, finding.best)))
         folder.write_text(EXTENDED, longer)
         before, after = conclusions.conclude(text), conclusions.conclude(longer)
     answer = {
@@ -141,7 +148,7 @@ def _write(
         "titles": {cause.name: cause.title for cause in causes},
         "separated_by": {cause.name: cause.separated_by for cause in causes},
         "model": {"extended": EXTENDED if finding.best is not None else None, "base": BASE},
-        "parameters": _parameters(problem, finding.best),
+        "parameters": {} if finding.best is None else describe(problem, finding.best),
         "gain": [asdict(entry) for entry in gains],
         "conclusions": None
         if before is None or after is None
@@ -169,16 +176,9 @@ def _effect(problem: Problem, candidate: Candidate, finding: Finding) -> dict[st
         "log_evidence": candidate.log_evidence,
         "form": candidate.form.name,
         "forms": candidate.forms,
-        "parameters": describe(problem, candidate.fitted, candidate.cause.name),
+        "parameters": describe(problem, candidate.fitted)[candidate.cause.name],
         "ambiguous": candidate.cause.name in finding.ambiguous,
     }
-
-
-def _parameters(problem: Problem, best: Fit | None) -> dict[str, list[dict[str, Any]]]:
-    """Return the fitted parameters of the causes that extend the model."""
-    if best is None:
-        return {}
-    return {form.cause: describe(problem, best, form.cause) for form in best.forms}
 
 
 def quantities(data: Measured) -> Mapping[str, tuple[str, str, Quantity]]:

@@ -195,6 +195,18 @@ def _loading(hidden: Sequence[Hidden], scale: float, order: int) -> Law:
     return law
 
 
+class _Event:
+    """Ends an integration where a value falls through zero."""
+
+    terminal, direction = True, -1.0
+
+    def __init__(self, value: Callable[[Array], float]) -> None:
+        self._value = value
+
+    def __call__(self, _t: float, y: Array) -> float:
+        return self._value(y)
+
+
 def _strike(
     hidden: Sequence[Hidden], lab: Laboratory, speed: float, scale: float, order: int
 ) -> tuple[Array, Array, Array, float]:
@@ -211,10 +223,7 @@ def _strike(
     def into(_t: float, y: Array) -> list[float]:
         return [y[1], -law(y[0], y[1]) / mass]
 
-    def stopped(_t: float, y: Array) -> float:
-        return float(y[1])
-
-    stopped.terminal, stopped.direction = True, -1.0  # type: ignore[attr-defined]
+    stopped = _Event(lambda y: float(y[1]))
     first = integrate.solve_ivp(into, (0.0, 0.2), [0.0, speed], events=stopped, **options)
     turn, deepest = float(first.t[-1]), float(first.y[0, -1])
     top = law(deepest, 0.0)
@@ -226,20 +235,19 @@ def _strike(
     def out(_t: float, y: Array) -> list[float]:
         return [y[1], -spring(y[0]) / mass]
 
-    def parted(_t: float, y: Array) -> float:
-        return float(y[0] - (deepest - top / slope))
-
-    parted.terminal, parted.direction = True, -1.0  # type: ignore[attr-defined]
+    parted = _Event(lambda y: float(y[0] - (deepest - top / slope)))
     second = integrate.solve_ivp(out, (turn, turn + 0.2), [deepest, 0.0], events=parted, **options)
     end, rebound = float(second.t[-1]), -float(second.y[1, -1])
+    into_hood, out_of_hood = first.sol, second.sol
+    assert into_hood is not None and out_of_hood is not None
     time = np.arange(round(-LEAD * RATE), round((end + TAIL) * RATE)) / RATE
     force = np.zeros(time.size)
     for k, t in enumerate(time):
         if 0.0 <= t <= turn:
-            depth, rate = first.sol(t)
+            depth, rate = into_hood(float(t))
             force[k] = law(float(depth), float(rate))
         elif turn < t <= end:
-            force[k] = spring(float(second.sol(t)[0]))
+            force[k] = spring(float(out_of_hood(float(t))[0]))
     return time, force, force / mass, rebound
 
 

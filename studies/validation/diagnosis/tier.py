@@ -84,8 +84,8 @@ def plan(sets: int) -> list[Trial]:
     whole = sum(SHARES.values())
     trials = []
     for (kind, force), share in SHARES.items():
-        for k in range(max(1, round(sets * share / whole))):
-            trials.append(Trial(10_000 + k, kind, force))
+        count = max(1, round(sets * share / whole))
+        trials += [Trial(10_000 + k, kind, force) for k in range(count)]
     return trials
 
 

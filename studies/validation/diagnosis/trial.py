@@ -89,7 +89,7 @@ def run_trial(trial: Trial, workers: int = 1) -> Outcome:
         make_tests(folder, hidden, trial.seed, laboratory)
         problem = _problem(folder)
         start = time.perf_counter()
-        finding = search(problem, causes_of("headform"), seed=trial.seed, workers=workers)
+        finding = search(problem, causes_of("headform"), workers=workers)
         seconds = time.perf_counter() - start
         size = _size(Path(scratch), hidden, trial.seed, laboratory, finding) if hidden else 0.0
     return Outcome(

@@ -1,0 +1,270 @@
+"""Accident collections: scalars of many accidents, none of which can be repeated.
+
+What is not recorded of an accident (posture, gait) makes one crash differ from the next more than
+any model error does. The crash core is therefore run over the whole collection with everything
+unknown drawn anew in each run: a quadratic surface in what is recorded gives the mean, and what is
+left is the scatter of single accidents. Every cause is run on the same draws, so that what it
+changes is a surface as well.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from mcstudy import config, seeds
+from mcstudy.config import MonteCarloStudy
+from mcstudy.diagnosis.problem import Cause, Form, Problem, Scalar, Test, Unknown, value_at
+from mcstudy.errors import StudyError, UserError
+from mcstudy.injury.ais import Mechanism, draw_ais, mix
+from mcstudy.injury.functions import risk_function
+from mcstudy.measured import HEADER, Measured
+from mcstudy.progress import follow
+from models.protocol import Model
+from models.registry import load_model
+from studies.diagnosis.emulator import (
+    Change,
+    Emulator,
+    Surface,
+    change_terms,
+    fit_terms,
+    quadratic_terms,
+)
+from studies.diagnosis.model_choice import ModelChoice
+from studies.evaluation import evaluate
+
+Array = NDArray[np.float64]
+
+POOL, PAIRED = 480, 120
+"""Runs of the model as it stands, and of each form of a cause."""
+CHUNK = 20
+FARTHEST = 2.5
+"""Score at which the sizes of causes that are tried end."""
+MOST_FAILED = 0.2
+"""Share of runs that may fail."""
+WIDER = 1.5
+"""Factor on the recorded uncertainties for the draws, so that the surface reaches beyond them."""
+LOGARITHMIC = ("hic15", "hic36", "ground_hic15", "clip_3ms", "peak_head_acceleration")
+"""Outputs whose logarithm is taken: their scatter grows with them."""
+AIS = "ais"
+MECHANISM = Mechanism(
+    "impact", ((risk_function("nhtsa_lognormal"), 1.0), (risk_function("prasad_mertz"), 1.0))
+)
+"""Risk functions by which an AIS of the head is simulated, as in the injury study of the case."""
+ADULT = 40.0
+"""Age (year) for risk functions if the model has none."""
+
+
+@dataclass(frozen=True)
+class _Draws:
+    """Runs over a collection: values of all inputs by name (n,), and uniforms for outcomes."""
+
+    columns: dict[str, Array]
+    uniforms: Array
+
+
+def is_collection(data: Measured) -> bool:
+    """Return whether measured data are accidents: scalars only, of the crash core."""
+    return data.header.model == "multibody" and not data.header.signals
+
+
+def build_collection(
+    problem: Problem,
+    data: Measured,
+    choice: ModelChoice,
+    causes: Sequence[Cause],
+    *,
+    seed: int,
+    workers: int,
+    quiet: bool,
+) -> tuple[Problem, Emulator]:
+    """Return the problem of an accident collection, on surfaces of the crash core.
+
+    Parameters
+    ----------
+    problem : of the data, with measured scalars as they are. data, choice : that it is of.
+    causes : whose changes are run. seed : of the draws. workers : processes, -1 one a core.
+    quiet : show no progress.
+
+    Raises
+    ------
+    UserError
+        If a scalar is none that accidents have.
+    StudyError
+        If too many runs fail.
+    """
+    model = load_model(choice.name, choice.options, choice.effects)
+    outputs = _outputs_of(data, model)
+    draws = _draw(problem, choice, model, seed)
+    with Parallel(n_jobs=workers) as pool:
+        raw = _run(pool, choice, {}, draws.columns, POOL)
+        base = _outcomes(model, raw, outputs, draws, POOL)
+        names = _variables(problem)
+        table = np.stack([draws.columns[name] for name in names], axis=1)
+        centre, scale = table.mean(axis=0), table.std(axis=0)
+        points = (table - centre) / scale
+        coefficients, left = fit_terms(quadratic_terms(points), base)
+        surface = Surface(names, centre, scale, coefficients)
+        changes = []
+        forms = [form for cause in causes for form in cause.forms]
+        for k, form in enumerate(follow(forms, "forms of causes", quiet=quiet)):
+            change = _change_of(pool, choice, form, draws, base, points, outputs, seed + k, model)
+            if change is not None:
+                changes.append(change)
+    scatter = np.sqrt(np.nanmean(left**2, axis=0) * POOL / (POOL - len(coefficients)))
+    spread = dict(zip(outputs, scatter.tolist(), strict=True))
+    wanted = [_key(name) for name in data.header.scalars]
+    emulator = Emulator(choice.name, outputs, surface, changes, wanted)
+    tests = tuple(_rescaled(test, spread) for test in problem.tests)
+    ranges = dict(problem.ranges)
+    return Problem(tests, problem.unknowns, emulator, ranges), emulator
+
+
+def _key(name: str) -> str:
+    return f"log_{name}" if name in LOGARITHMIC else name
+
+
+def _outputs_of(data: Measured, model: Model) -> tuple[str, ...]:
+    """Return the outputs of the surfaces: those measured, then the usual others."""
+    known = [item.name for item in model.outputs]
+    usual = ("throw_distance", "wad", "hic15", "head_impact_time", "car_stopping_distance", AIS)
+    names = dict.fromkeys([*data.header.scalars, *usual])
+    for name in names:
+        if name not in known and name != AIS:
+            raise UserError(f"{data.source / HEADER}: scalars.{name}: the model has no such output")
+    return tuple(_key(name) for name in names)
+
+
+def _variables(problem: Problem) -> tuple[str, ...]:
+    """Return what the surfaces are in: recorded inputs that differ, and shared unknowns."""
+    tests = problem.tests
+    moving = [
+        name
+        for name in tests[0].inputs
+        if np.ptp([test.inputs[name] for test in tests]) > 0.0 or name in tests[0].doubtful
+    ]
+    return tuple(dict.fromkeys([*moving, *(u.name for u in problem.unknowns)]))
+
+
+def _draw(problem: Problem, choice: ModelChoice, model: Model, seed: int) -> _Draws:
+    """Return draws over a collection: accidents as recorded, the rest from what is known."""
+    rng = seeds.generator(seed, seeds.DESIGN)
+    tests = problem.tests
+    columns = {item.name: np.full(POOL, item.nominal) for item in model.inputs}
+    study = choice.study
+    if isinstance(study, MonteCarloStudy):
+        recorded = {*tests[0].inputs, *(u.name for u in problem.unknowns)}
+        sampled = config.map_inputs(study, model, rng.random((POOL, len(study.inputs))))
+        columns |= {name: values for name, values in sampled.items() if name not in recorded}
+    rows = rng.permutation(np.arange(POOL) % len(tests))
+    for name in tests[0].inputs:
+        values = np.array([tests[i].inputs[name] for i in rows])
+        sd = tests[0].doubtful.get(name, 0.0)
+        low, high = problem.ranges[name]
+        columns[name] = np.clip(values + WIDER * sd * rng.standard_normal(POOL), low, high)
+    for unknown in problem.unknowns:
+        scores = np.clip(WIDER * rng.standard_normal(POOL), -3.0, 3.0)
+        columns[unknown.name] = np.array([_value(unknown, z) for z in scores])
+    return _Draws(columns, rng.random(POOL))
+
+
+def _value(unknown: Unknown, score: float) -> float:
+    return value_at(unknown.quantile, float(score))
+
+
+def _run(
+    pool: Parallel,
+    choice: ModelChoice,
+    effects: Mapping[str, Mapping[str, float]],
+    columns: Mapping[str, Array],
+    count: int,
+) -> Array:
+    """Return the model's outputs (count, m) of the first draws, NaN where a run failed."""
+    switched = {**choice.effects, **effects}
+    model = load_model(choice.name, choice.options, switched)
+    rows = np.stack([columns[item.name][:count] for item in model.inputs], axis=1)
+    argument = {
+        "name": choice.name, "options": dict(choice.options), "effects": switched,
+        "version": model.version,
+    }  # fmt: skip
+    parts = pool(delayed(evaluate)(argument, rows[k : k + CHUNK]) for k in range(0, count, CHUNK))
+    table: Array = np.concatenate([outputs for outputs, _ in parts])
+    failed = float(np.isnan(table).all(axis=1).mean())
+    if failed > MOST_FAILED:
+        raise StudyError(f"{100.0 * failed:.0f} % of the runs over the accidents failed")
+    return table
+
+
+def _outcomes(
+    model: Model, table: Array, outputs: Sequence[str], draws: _Draws, count: int
+) -> Array:
+    """Return what accidents show (count, m): outputs, logarithms, an AIS drawn from the risk."""
+    by_name = {item.name: table[:, k] for k, item in enumerate(model.outputs)}
+    found = []
+    for key in outputs:
+        if key == AIS:
+            age = draws.columns.get("age", np.full(POOL, ADULT))[:count]
+            exceeding = mix(MECHANISM, {"hic15": by_name["hic15"]}, age)
+            drawn = draw_ais(exceeding, draws.uniforms[:count]).astype(float)
+            found.append(np.where(np.isfinite(by_name["throw_distance"]), drawn, np.nan))
+        elif key.startswith("log_"):
+            values = by_name[key.removeprefix("log_")]
+            with np.errstate(invalid="ignore", divide="ignore"):
+                found.append(np.where(values > 0.0, np.log(values), np.nan))
+        else:
+            found.append(by_name[key])
+    return np.stack(found, axis=1)
+
+
+def _change_of(
+    pool: Parallel,
+    choice: ModelChoice,
+    form: Form,
+    draws: _Draws,
+    base: Array,
+    points: Array,
+    outputs: Sequence[str],
+    seed: int,
+    model: Model,
+) -> Change | None:
+    """Return what a form changes, from runs of the same draws with and without it."""
+    rng = seeds.generator(seed, seeds.OUTCOME)
+    scores = rng.uniform(-FARTHEST, FARTHEST, (PAIRED, len(form.free)))
+    columns = dict(draws.columns)
+    for k, parameter in enumerate(form.free):
+        values = np.full(POOL, value_at(parameter.quantile, 0.0))
+        values[:PAIRED] = [value_at(parameter.quantile, float(z)) for z in scores[:, k]]
+        columns[f"{form.cause}_{parameter.name}"] = values
+    for name, value in form.fixed.items():
+        columns[f"{form.cause}_{name}"] = np.full(POOL, value)
+    raw = _run(pool, choice, {form.cause: {}}, columns, PAIRED)
+    changed = _outcomes(model, raw, outputs, draws, PAIRED) - base[:PAIRED]
+    if not np.any(np.abs(np.nan_to_num(changed)) > 0.0):
+        return None
+    centred = all(
+        np.isclose(value_at(p.quantile, 0.0), p.none, rtol=1e-9, atol=1e-12) for p in form.free
+    )
+    terms = change_terms(scores, points[:PAIRED], centred=centred)
+    coefficients, _ = fit_terms(terms, changed)
+    # An output that never changes must not seem to, by the scatter of the others.
+    still = ~np.any(np.abs(np.nan_to_num(changed)) > 0.0, axis=0)
+    coefficients[:, still] = 0.0
+    return Change(form, centred, coefficients)
+
+
+def _rescaled(test: Test, scatter: Mapping[str, float]) -> Test:
+    """Return an accident whose scalars carry the scatter of single accidents."""
+    scalars = []
+    for scalar in test.scalars:
+        key = _key(scalar.name)
+        value, sd = scalar.value, scalar.sd
+        if key != scalar.name and np.isfinite(sd):
+            positive = max(value, 1e-9)
+            value, sd = float(np.log(positive)), sd / positive
+        whole = float(np.hypot(sd, scatter[key]))
+        scalars.append(Scalar(key, value, whole, scatters=False))
+    return Test(
+        test.name, test.inputs, test.doubtful, (), tuple(scalars), test.derived, test.covariates
+    )

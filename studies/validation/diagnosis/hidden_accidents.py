@@ -1,0 +1,107 @@
+"""Accident collections with a hidden effect: the crash core with altered inputs.
+
+Nothing of the finder's catalogue is used: a wet road is a run with less friction for those who
+slide beyond a place, a nose that dives more is another angle, a softer hood another factor.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mcstudy import config
+from mcstudy.config import MonteCarloStudy, load_study
+from models.registry import load_model
+from studies.validation.diagnosis.hidden_effects import Hidden
+
+Array = NDArray[np.float64]
+
+RECORDED = {"impact_speed": ("m/s", 0.8), "stature": ("m", 0.0), "body_mass": ("kg", 0.0)}
+"""What is recorded of an accident: unit and standard uncertainty."""
+SCALARS = {"throw_distance": ("m", 0.5), "wad": ("m", 0.04), "hic15": ("1", 60.0)}
+"""What is measured: unit and standard uncertainty."""
+
+
+def make_accidents(
+    folder: Path, study_file: Path, hidden: Sequence[Hidden], seed: int, accidents: int = 60
+) -> None:
+    """Write a collection of accidents with the effects in it.
+
+    Parameters
+    ----------
+    folder : to be made. study_file : Monte Carlo study whose inputs accidents are drawn from.
+    hidden : effects, by altered inputs. seed : of the draws. accidents : number.
+    """
+    rng = np.random.default_rng(seed)
+    study = load_study(study_file)
+    assert isinstance(study, MonteCarloStudy)
+    model = load_model(study.model.name, study.model.options)
+    spare = 2 * accidents
+    columns = config.map_inputs(study, model, rng.random((spare, len(study.inputs))))
+    altered = _altered({k: v.copy() for k, v in columns.items()}, hidden)
+    names = [item.name for item in model.inputs]
+    batch = model.run_batch(np.stack([altered[name] for name in names], axis=1))
+    outputs = {item.name: batch.outputs[:, k] for k, item in enumerate(model.outputs)}
+    outputs["throw_distance"] = _thrown(altered, outputs, hidden)
+    good = np.flatnonzero(np.all([np.isfinite(outputs[name]) for name in SCALARS], axis=0))[
+        :accidents
+    ]
+    table = {"test": [f"a{k + 1:03d}" for k in range(good.size)]}
+    frame = pd.DataFrame(table)
+    for name, (_, sd) in RECORDED.items():
+        frame[name] = columns[name][good] + sd * rng.standard_normal(good.size)
+    for name, (_, sd) in SCALARS.items():
+        frame[name] = outputs[name][good] + sd * rng.standard_normal(good.size)
+    folder.mkdir(parents=True)
+    frame.to_csv(folder / "tests.csv", index=False)
+    (folder / "measured.toml").write_text(_header(study), encoding="utf-8")
+
+
+def _altered(columns: dict[str, Array], hidden: Sequence[Hidden]) -> dict[str, Array]:
+    """Return the inputs as they truly were."""
+    for h in hidden:
+        if h.name == "brake_dive":
+            columns["dive_angle"] = columns["dive_angle"] + h.numbers["angle"]
+        elif h.name == "hood_force_scale":
+            columns["hood_force_scale"] = columns["hood_force_scale"] * h.numbers["factor"]
+        elif h.name == "speed_bias":
+            columns["impact_speed"] = columns["impact_speed"] * h.numbers["factor"]
+        elif h.name == "muscle_tone":
+            for name in ("neck_stiffness", "muscle_tone"):
+                columns[name] = columns[name] * h.numbers["factor"]
+    return columns
+
+
+def _thrown(
+    columns: Mapping[str, Array], outputs: Mapping[str, Array], hidden: Sequence[Hidden]
+) -> Array:
+    """Return the throw distances (m), lengthened where the road beyond a place is wet.
+
+    A body that still has the speed v at the place slides v^2 / (2 mu g) on from there.
+    """
+    throw = outputs["throw_distance"]
+    for h in hidden:
+        if h.name == "wet_road":
+            beyond = np.maximum(throw - h.numbers["place"], 0.0)
+            throw = throw + beyond * (1.0 / h.numbers["factor"] - 1.0)
+        elif h.name == "tape":
+            # Outside the catalogue: every throw is taped too short by a length.
+            throw = throw - h.numbers["length"]
+    return throw
+
+
+def _header(study: MonteCarloStudy) -> str:
+    lines = [
+        'format = "mcstudy-measured/1"',
+        'title = "Child pedestrians, one car"',
+        'model = "multibody"',
+        "",
+        "[fixed]",
+        *(f"{name} = {entry.value!r}" for name, entry in study.fixed.items()),
+    ]
+    for table, entries in (("inputs", RECORDED), ("scalars", SCALARS)):
+        for name, (unit, sd) in entries.items():
+            lines += ["", f"[{table}.{name}]", f'unit = "{unit}"', f"sd = {sd}"]
+    return "\n".join(lines) + "\n"

@@ -6,13 +6,13 @@ over the recorded inputs. Size and length are those that make the data most prob
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.fit import Fit
-from mcstudy.diagnosis.layout import Layout
+from mcstudy.diagnosis.fit import Fit, Scores, Slopes
+from mcstudy.diagnosis.layout import Layout, Scatter
 from mcstudy.diagnosis.marginal import Marginal
 from mcstudy.diagnosis.templates import Shapes, smooth_discrepancy
 
@@ -73,14 +73,18 @@ class Discrepancy:
         return means, roots
 
 
-def fit_discrepancy(fitted: Fit, layouts: Sequence[Layout], shapes: Shapes) -> Discrepancy:
+def fit_discrepancy(
+    fitted: Fit, layouts: Sequence[Layout], shapes: Shapes, scatter: Scatter
+) -> Discrepancy:
     """Return the process that makes the tests of a fit most probable.
 
     Parameters
     ----------
-    fitted : Fit of the base model. layouts : of its tests.
+    fitted : Fit of the base model, whose shared values are kept. layouts : of its tests.
     shapes : smooth shapes; those that are the same in all tests are taken.
+    scatter : repeatability beside the process.
     """
+    fitted = _with_shared_kept(fitted)
     plain = _plain(shapes)
     count = len(plain.names)
     names = tuple(layouts[0].test.inputs)
@@ -89,7 +93,7 @@ def fit_discrepancy(fitted: Fit, layouts: Sequence[Layout], shapes: Shapes) -> D
     names = tuple(np.array(names)[moving].tolist())
     centre, scale = table[:, moving].mean(axis=0), table[:, moving].std(axis=0)
     points = (table[:, moving] - centre) / scale
-    information, score = _per_test(fitted, layouts, plain, count)
+    information, score = _per_test(fitted, layouts, plain, count, scatter)
     best: tuple[float, float, float, Array, Array] | None = None
     for size, length in itertools.product(SIZES, LENGTHS):
         kernel = _kernel(points, points, size, length)
@@ -106,6 +110,16 @@ def fit_discrepancy(fitted: Fit, layouts: Sequence[Layout], shapes: Shapes) -> D
     return Discrepancy(names, centre, scale, points, best[1], best[2], best[3], best[4], count)
 
 
+def _with_shared_kept(fitted: Fit) -> Fit:
+    """Return a fit in whose linear model the shared values are known."""
+    empty = tuple(table[:, :0] for table in fitted.slopes.shared)
+    return replace(
+        fitted,
+        scores=Scores(np.zeros(0), fitted.scores.own),
+        slopes=Slopes(fitted.slopes.doubtful, empty),
+    )
+
+
 def _plain(shapes: Shapes) -> Shapes:
     """Return the shapes that are not multiplied by a regime or covariate."""
     kept = [k for k, name in enumerate(shapes.names) if name.endswith("all tests")]
@@ -115,7 +129,7 @@ def _plain(shapes: Shapes) -> Shapes:
 
 
 def _per_test(
-    fitted: Fit, layouts: Sequence[Layout], plain: Shapes, count: int
+    fitted: Fit, layouts: Sequence[Layout], plain: Shapes, count: int, scatter: Scatter
 ) -> tuple[Array, Array]:
     """Return information and score of a coefficient for each shape and test."""
     tests = len(layouts)
@@ -125,7 +139,7 @@ def _per_test(
         wide[:, i * count : (i + 1) * count] = table
         columns.append(wide)
     marginal = Marginal(fitted, layouts, columns)
-    reduced = marginal.reduce(marginal.measured(), fitted.scatter)
+    reduced = marginal.reduce(marginal.measured(), scatter)
     return reduced.information, reduced.score[0]
 
 

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from mcstudy.diagnosis.discrepancy import Discrepancy, fit_discrepancy
 from mcstudy.diagnosis.fit import Fit, FitError, Scores, Slopes, fit, observe_tests
-from mcstudy.diagnosis.layout import Layout
+from mcstudy.diagnosis.layout import Layout, Scatter
 from mcstudy.diagnosis.problem import Problem
+from mcstudy.diagnosis.screening import estimate_scatter
 from mcstudy.diagnosis.templates import smooth_discrepancy
 from mcstudy.statistics import Estimate
 
@@ -40,6 +41,7 @@ class Gain:
     unit : of the score. base, extended, gaussian_process : means over the held-out tests.
     difference : extended against base, positive if better, with its interval.
     against_process : the same against the Gaussian process.
+    relative : difference over the base's score.
     """
 
     score: str
@@ -50,6 +52,7 @@ class Gain:
     gaussian_process: float
     difference: Estimate
     against_process: Estimate
+    relative: Estimate
 
 
 @dataclass(frozen=True)
@@ -122,7 +125,10 @@ def _score(
         except FitError:
             continue
         part = [layouts[i] for i in kept]
-        process = fit_discrepancy(trained["base"], part, smooth_discrepancy(part, trained["base"]))
+        shapes = smooth_discrepancy(part, trained["base"])
+        # What the process explains is not repeatability.
+        calm = estimate_scatter(trained["base"], part, shapes)
+        process = fit_discrepancy(trained["base"], part, shapes, calm)
         # The same noise for all three, so that their differences are not of the draws.
         seeds = rng.integers(2**32, size=held.size)
         for name in MODELS:
@@ -134,7 +140,7 @@ def _score(
             if predicted is None:
                 continue
             if name == "gaussian_process":
-                predicted = _corrected(layouts, base, held, predicted, process)
+                predicted = _corrected(layouts, base, held, predicted, process, calm)
             for i, prediction, seed in zip(held, predicted, seeds, strict=True):
                 own = np.random.default_rng(seed)
                 for key, value in _judge(layouts[i], base, i, prediction, quantities, own).items():
@@ -182,18 +188,30 @@ def _corrected(
     held: NDArray[np.int64],
     predicted: Sequence[_Prediction],
     process: Discrepancy,
+    calm: Scatter,
 ) -> list[_Prediction]:
-    """Return predictions with the Gaussian process added."""
+    """Return predictions with the Gaussian process added, and the repeatability beside it."""
     places = [layouts[i] for i in held]
     shapes = process.shapes_of(layouts, base)
     means, roots = process.predict(places)
     return [
         _Prediction(
             prediction.mean + shapes[i] @ mean,
-            np.concatenate([prediction.factor, shapes[i] @ root], axis=1),
+            np.concatenate(
+                [prediction.factor * _calmed(layouts[i], base, prediction, calm), shapes[i] @ root],
+                axis=1,
+            ),
         )
         for i, prediction, mean, root in zip(held, predicted, means, roots, strict=True)
     ]
+
+
+def _calmed(layout: Layout, base: Fit, prediction: _Prediction, calm: Scatter) -> Array:
+    """Return what the columns of a factor are multiplied by for another repeatability."""
+    scale = np.ones(prediction.factor.shape[1])
+    own = scale[: layout.scattering.size]
+    own[layout.scattering] = layout.scatter_sizes(calm) / layout.scatter_sizes(base.scatter)
+    return scale
 
 
 def _judge(
@@ -281,6 +299,7 @@ def _compare(
                 against_process=_better(
                     tables["extended"], tables["gaussian_process"], score, rows
                 ),
+                relative=_better(tables["extended"], tables["base"], score, rows, relative=True),
             )
         )
     return gains
@@ -293,10 +312,16 @@ def _mean(values: Array, score: str) -> Array:
     return np.asarray(np.mean(values, axis=-1))
 
 
-def _better(ours: Array, theirs: Array, score: str, rows: NDArray[np.int64]) -> Estimate:
+def _better(
+    ours: Array, theirs: Array, score: str, rows: NDArray[np.int64], *, relative: bool = False
+) -> Estimate:
     """Return by how much our score is better, with a paired bootstrap interval."""
     sign = 1.0 if score == "log_score" else -1.0
-    value = sign * float(_mean(ours, score) - _mean(theirs, score))
-    spread = sign * (_mean(ours[rows], score) - _mean(theirs[rows], score))
-    low, high = np.quantile(spread, [0.025, 0.975])
+
+    def gain(mine: Array, other: Array) -> Array:
+        difference = sign * (_mean(mine, score) - _mean(other, score))
+        return difference / np.abs(_mean(other, score)) if relative else difference
+
+    value = float(gain(ours, theirs))
+    low, high = np.quantile(gain(ours[rows], theirs[rows]), [0.025, 0.975])
     return Estimate(value, float(low), float(high))

@@ -90,6 +90,7 @@ def draw_map(where: Mapping[str, Any], labels: Mapping[str, str], regime: str) -
 
 def draw_evidence(effects: Sequence[Mapping[str, Any]]) -> Figure:
     """Return the causes by evidence above the model as it stands."""
+    # What makes the model worse is as far left as it can be seen.
     shown = list(effects)[:12]
     with style.styled():
         figure = style.new_figure(7.0, 0.34 * len(shown) + 1.2)
@@ -103,6 +104,11 @@ def draw_evidence(effects: Sequence[Mapping[str, Any]]) -> Figure:
         axes.invert_yaxis()
         axes.axvline(3.0, color="black", linestyle=":", linewidth=1.0)
         axes.set_xscale("symlog", linthresh=10.0)
+        top = max(10.0, 2.0 * max(values))
+        axes.set_xlim(-10.0, top)
+        ticks = [-10.0, 0.0, *(10.0**k for k in range(1, 8) if 10.0**k <= top)]
+        axes.set_xticks(ticks, [f"{tick:,.0f}" for tick in ticks])
+        axes.minorticks_off()
         axes.set_xlabel("log evidence above the model as it stands [natural log units]")
         axes.grid(visible=False, axis="y")
         return figure
@@ -118,12 +124,11 @@ def draw_gain(gains: Sequence[Mapping[str, Any]], labels: Mapping[str, str]) -> 
         for axes, region in zip(grid, regions, strict=True):
             own = [g for g in shown if g["region"] == region]
             for k, gain in enumerate(own):
-                scale = 100.0 / abs(gain["base"])
-                entry = gain["difference"]
-                axes.plot([scale * entry["low"], scale * entry["high"]], [k, k], color=style.RED)
-                axes.plot(scale * entry["value"], k, "o", color=style.RED,
+                entry = gain["relative"]
+                axes.plot([100.0 * entry["low"], 100.0 * entry["high"]], [k, k], color=style.RED)
+                axes.plot(100.0 * entry["value"], k, "o", color=style.RED,
                           label="extended model" if k == 0 else None)  # fmt: skip
-                process = scale * (gain["base"] - gain["gaussian_process"])
+                process = 100.0 * (1.0 - gain["gaussian_process"] / gain["base"])
                 axes.plot(process, k, "s", color=style.BLUE, markerfacecolor="none",
                           label="Gaussian process" if k == 0 else None)  # fmt: skip
             axes.set_yticks(range(len(own)), [labels[g["score"]] for g in own])

@@ -125,26 +125,26 @@ def _why(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> Section:
         values = ", ".join(
             f"{p['name'].replace('_', ' ')} {words.shown(p)}"
             for p in row["parameters"]
-            if not p.get("fixed")
+            if not p["fixed"]
         )
         rows.append(
             [row["name"].replace("_", " "), number(row["log_evidence"]), row["form"], values]
         )
     table = Table(
-        "Causes by evidence above the model as it stands, in natural log units, averaged over the "
-        "forms of a cause; parameters of the best form with 95 % half-widths.",
+        "Causes by evidence; parameters of the best form with 95 % half-widths.",
         ["cause", "log evidence", "best form", "parameters"],
         rows,
     )
     lines = [
         "Every cause of the catalogue was fitted with all uncertain inputs, in each of its forms. "
-        "Causes within 3 log units of the best cannot be told apart; below 3 log units none is "
-        "named."
+        "Evidence is above that of the model as it stands, in natural log units, averaged over the "
+        "forms of a cause. Causes within 3 log units of the best cannot be told apart; below 3 log "
+        "units none is named."
     ]
     left = analysis["remainder"]
     if left is not None:
         lines.append(
-            f"The best cause explains {100.0 * left['share']:.0f} % of the misfit; what is left "
+            f"What was named explains {100.0 * left['share']:.0f} % of the misfit; what is left "
             f"has {words.probability(left['p_value'])}."
         )
     return Section("Why", lines, [table], {"Evidence of each cause.": figures["evidence"]})
@@ -153,21 +153,17 @@ def _why(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> Section:
 def _gain(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> Section:
     rows = []
     for g in analysis["gain"]:
-        d, p = g["difference"], g["against_process"]
+        d = g["difference"]
         rows.append(
-            [g["score"].replace("_", " "), g["region"], *(number(g[k]) for k in (
-                "base", "extended", "gaussian_process")),
-             f"{number(d['value'])} ({number(d['low'])} to {number(d['high'])})",
-             f"{number(p['value'])} ({number(p['low'])} to {number(p['high'])})"]
+            [g["score"].replace("_", " "), g["region"], number(g["base"]), number(g["extended"]),
+             number(g["gaussian_process"]),
+             f"{number(d['value'])} ({number(d['low'])} to {number(d['high'])})"]
         )  # fmt: skip
     table = Table(
-        "Scores of held-out tests; the log score is better when larger, all others when smaller. "
-        "Differences are positive where the extended model is better, with 95 % bootstrap "
-        "intervals over tests.",
-        ["score", "region", "base", "extended", "Gaussian process", "better than base",
-         "better than the process"],
+        "Scores of held-out tests, with 95 % intervals of the gain.",
+        ["score", "region", "base", "extended", "process", "better than base"],
         rows,
-    )  # fmt: skip
+    )
     shown = {}
     if "gain" in figures:
         shown["Gain on held-out tests, with 95 % intervals."] = figures["gain"]
@@ -175,7 +171,9 @@ def _gain(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> Section:
         shown["What the extension changes in the study's conclusions."] = figures["conclusions"]
     lines = [
         "Whole tests were held out, a sixth at a time (inside), and the fastest quarter at once "
-        "(beyond). The Gaussian process corrects the base model's pulses without naming a cause."
+        "(beyond). The Gaussian process corrects the base model without naming a cause. The log "
+        "score is better when larger, all others when smaller; intervals are of a paired bootstrap "
+        "over tests."
     ]
     return Section("What the extension gains", lines, [table], shown)
 
@@ -187,7 +185,7 @@ def _visible(analysis: Mapping[str, Any]) -> Section:
     ]
     tables = [
         Table(
-            "Smallest size of each cause that these tests would have shown with 80 % power.",
+            "Smallest size of each cause that would have been seen with 80 % power.",
             ["cause", "parameter", "smallest size"],
             rows,
         )
@@ -195,8 +193,7 @@ def _visible(analysis: Mapping[str, Any]) -> Section:
     if analysis["worth"]:
         tables.append(
             Table(
-                "Measurements that could be added: how far the causes named would stand apart, and "
-                "how much more clearly causes would be seen.",
+                "Measurements that could be added.",
                 ["measurement", "separation [log units]", "clearer by the factor"],
                 [[w["title"], number(w["separation"], 2), number(w["visibility"], 3)]
                  for w in analysis["worth"]],
@@ -211,8 +208,7 @@ def _statistics(analysis: Mapping[str, Any]) -> Table:
         for name, entry in analysis["statistics"].items()
     ]
     return Table(
-        "Four ways of looking for a misfit; the smallest p-value is calibrated on data that the "
-        "model makes.",
+        "Four ways of looking for a misfit.",
         ["kind of misfit", "statistic", "p-value"],
         rows,
     )
@@ -225,6 +221,8 @@ def _method(analysis: Mapping[str, Any]) -> list[str]:
         "within their uncertainty, time origin and offset of each test, and a repeatability of the "
         f"pulse from test to test ({100.0 * r['level']:.1f} % of its level, "
         f"{100.0 * r['shape']:.1f} % of its shape).",
+        "A misfit is looked for in four ways; the smallest of their p-values is calibrated on data "
+        "that the model makes.",
         "With the signs of whole tests flipped instead of a covariance the catalogue's p-value is "
         f"{number(analysis['flip_p_value'], 2)}; it cannot be small where few tests carry the "
         "misfit.",

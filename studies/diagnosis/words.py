@@ -38,9 +38,16 @@ SENTENCES = {
 }
 
 
+def _shown_unit(name: str, value: float) -> tuple[str, float]:
+    """Return the unit in which people read a value, and its factor."""
+    if name == "m" and abs(value) >= 1.0:
+        return name, 1.0
+    return SHOWN_UNITS.get(name, (name, 1.0))
+
+
 def shown(row: Mapping[str, Any]) -> str:
     """Return a parameter with its interval, in the unit in which people read it."""
-    name, factor = SHOWN_UNITS.get(row.get("unit", "1"), (row.get("unit", "1"), 1.0))
+    name, factor = _shown_unit(row.get("unit", "1"), float(row["value"]))
     value, low, high = (factor * float(row[key]) for key in ("value", "low", "high"))
     half = 0.5 * (high - low)
     text = f"{number(value)} ± {number(half, 2)}" if half > 0.0 else number(value)
@@ -123,16 +130,16 @@ def location(where: Mapping[str, Any], units: Mapping[str, str]) -> str:
 def gain_words(gains: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return what the extension gains on held-out tests."""
     lines = []
-    for score, name in (("crps_hic15", "HIC15"), ("crps_peak_head_acceleration", "the peak")):
+    scores = dict.fromkeys(g["score"] for g in gains if g["score"].startswith("crps_"))
+    for score in scores:
+        name = words(score.removeprefix("crps_"))
         for entry in gains:
             if entry["score"] != score or not entry["base"]:
                 continue
-            scale = 100.0 / entry["base"]
-            d = entry["difference"]
+            d = {key: 100.0 * value for key, value in entry["relative"].items()}
             lines.append(
                 f"{capital(entry['region'])} the speeds used, predictions of {name} are "
-                f"{scale * d['value']:.0f} % better (CRPS, {scale * d['low']:.0f} to "
-                f"{scale * d['high']:.0f} %)."
+                f"{d['value']:.0f} % better (CRPS, {d['low']:.0f} to {d['high']:.0f} %)."
             )
     return lines
 
@@ -160,7 +167,7 @@ def visible_words(entry: Mapping[str, Any]) -> str:
     value, none = entry["value"], entry["none"]
     if value is None:
         return "no size within the prior"
-    name, factor = SHOWN_UNITS.get(entry["unit"], (entry["unit"], 1.0))
+    name, factor = _shown_unit(entry["unit"], float(value))
     if none == 1.0 and entry["unit"] == "1":
         return f"{100.0 * abs(value - 1.0):.2g} %"
     return quantity(factor * value, name)

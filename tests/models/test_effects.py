@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from models.effects.registry import EFFECTS, load_effect
+from models.effects.registry import EFFECTS, effects_of, load_effect
 from models.protocol import Run
 from models.registry import load_model
 
@@ -22,14 +22,14 @@ def struck(
     return load_model("headform", options, effects).run({"impact_speed": 9.0} | inputs)
 
 
-@pytest.mark.parametrize("name", EFFECTS)
+@pytest.mark.parametrize("name", effects_of("headform"))
 def test_an_effect_at_its_value_for_none_changes_no_bit(name: str) -> None:
     effect = load_effect(name)
     off = struck({name: {key: entry.none for key, entry in effect.parameters.items()}})
     assert off.outputs == struck().outputs
 
 
-@pytest.mark.parametrize("name", EFFECTS)
+@pytest.mark.parametrize("name", effects_of("headform"))
 def test_parameters_are_inputs_of_the_extended_model(name: str) -> None:
     effect = load_effect(name)
     model = load_model("headform", {"hood_curve": CURVE}, {name: {}})
@@ -46,7 +46,7 @@ def test_parameters_are_inputs_of_the_extended_model(name: str) -> None:
     )
 
 
-@pytest.mark.parametrize("name", EFFECTS)
+@pytest.mark.parametrize("name", effects_of("headform"))
 def test_every_effect_says_what_it_is_and_what_it_looks_like(name: str) -> None:
     effect = load_effect(name)
     assert (effect.title and effect.signature and effect.separated_by) or not effect.confusable

@@ -1,0 +1,81 @@
+"""Scores of held-out tests against closed forms, and the Gaussian process against a dense one."""
+
+import numpy as np
+import pytest
+from linear_tests import BUMP, make_problem
+from scipy import stats
+
+from mcstudy.diagnosis import gain
+from mcstudy.diagnosis.discrepancy import fit_discrepancy
+from mcstudy.diagnosis.fit import Fit
+from mcstudy.diagnosis.gain import Gain, measure_gain
+from mcstudy.diagnosis.layout import Layout
+from mcstudy.diagnosis.naming import rank_causes, settle
+from mcstudy.diagnosis.problem import Problem
+from mcstudy.diagnosis.search import fit_base
+from mcstudy.diagnosis.templates import smooth_discrepancy
+
+PEAK = {"peak": ("g", "head_acceleration", lambda _t, v: float(v.max()))}
+
+
+def test_crps_of_a_normal_sample() -> None:
+    # Closed form of Gneiting and Raftery for N(0, 1) at y.
+    rng = np.random.default_rng(0)
+    draws = rng.standard_normal(40_000)
+    for y in (0.0, 1.3):
+        exact = y * (2 * stats.norm.cdf(y) - 1) + 2 * stats.norm.pdf(y) - 1 / np.sqrt(np.pi)
+        assert gain._crps(draws, y) == pytest.approx(exact, abs=0.01)
+
+
+def test_log_score_is_the_density_of_the_whole_pulse() -> None:
+    rng = np.random.default_rng(1)
+    factor, off = rng.standard_normal((30, 4)), rng.standard_normal(30)
+    exact = stats.multivariate_normal(cov=np.eye(30) + factor @ factor.T).logpdf(off)
+    ours = gain._log_density(off, factor) - 15.0 * np.log(2.0 * np.pi)
+    assert ours == pytest.approx(exact, rel=1e-9)
+
+
+def fits(bump: float, seed: int) -> tuple[Problem, tuple[Layout, ...], Fit, Fit]:
+    problem = make_problem(seed, bump=bump, tests=16)
+    layouts, base = fit_base(problem)
+    base = settle(problem, layouts, base)
+    best = rank_causes(problem, layouts, base, [BUMP], 1, 5)[0]
+    return problem, layouts, base, best.fitted
+
+
+def named(gains: list[Gain], score: str, region: str = "inside") -> Gain:
+    return next(g for g in gains if g.score == score and g.region == region)
+
+
+def test_an_effect_that_is_there_gains_and_one_that_is_not_does_not() -> None:
+    gains = measure_gain(*fits(1.0, 11), PEAK, seed=0)
+    for region in ("inside", "beyond"):
+        assert named(gains, "log_score", region).difference.low > 0.0
+    assert named(gains, "rmse_head_acceleration").difference.low > 0.0
+    nothing = named(measure_gain(*fits(0.0, 12), PEAK, seed=0), "log_score")
+    assert nothing.difference.value < 2.0
+
+
+def test_scores_of_the_same_seed_are_the_same() -> None:
+    problem, layouts, base, extended = fits(0.5, 13)
+    first = measure_gain(problem, layouts, base, extended, PEAK, seed=4)
+    assert first == measure_gain(problem, layouts, base, extended, PEAK, seed=4)
+
+
+def test_the_process_predicts_what_the_base_model_misses() -> None:
+    found = named(measure_gain(*fits(1.0, 14), PEAK, seed=0), "log_score")
+    assert found.base < found.gaussian_process < found.extended
+
+
+def test_the_process_is_that_of_dense_regression() -> None:
+    problem, layouts, base, _ = fits(1.0, 15)
+    shapes = smooth_discrepancy(layouts, base)
+    process = fit_discrepancy(base, layouts, shapes, base.scatter)
+    means, roots = process.predict(layouts)
+    # At the tests themselves the prediction is the posterior mean.
+    own = process.mean.reshape(len(problem.tests), process.shapes)
+    np.testing.assert_allclose(np.array(means), own, atol=1e-3 * np.abs(own).max())
+    # And its spread is that of the posterior.
+    variance = np.diag(process.covariance).reshape(own.shape)
+    spread = np.array([np.sum(root**2, axis=1) for root in roots])
+    np.testing.assert_allclose(spread, variance, rtol=0.05, atol=1e-6)

@@ -1,0 +1,153 @@
+"""Effects hidden by another program must be found: the fast tier.
+
+The full tier is ``mcstudy validate --diagnosis``.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mcstudy.measured import load_measured
+from models.registry import load_model
+from studies.validation.diagnosis.drawing import CATALOGUE, KINDS, OUTSIDE, draw
+from studies.validation.diagnosis.hidden_effects import CURVE, Hidden, Laboratory, make_tests
+from studies.validation.diagnosis.tier import TARGETS, analyse, plan
+from studies.validation.diagnosis.trial import Outcome, Trial, run_trial
+
+QUIET = Laboratory(tests=3, noise_sd=0.0, scatter=0.0, speed_sd=0.0, scale_sd=0.0)
+
+
+def test_generator_and_model_agree_where_nothing_is_hidden(tmp_path: Path) -> None:
+    make_tests(tmp_path / "m", [], 1, QUIET)
+    data = load_measured(tmp_path / "m")
+    model = load_model("headform", {"hood_curve": [list(knot) for knot in CURVE]})
+    for row, name in enumerate(data.tests["test"]):
+        time, measured = data.signal(name, "head_acceleration", "g")
+        speed = float(data.tests["impact_speed"].iloc[row])
+        run = model.run({"impact_speed": speed, "headform_mass": 2.5, "hood_unloading_ratio": 7.0})
+        head = run.histories["head"]
+        ours = np.interp(time, head.time, head.channels["acceleration"])
+        inside = (time > 0.0) & (time < head.time[-1])
+        assert np.abs(ours - measured)[inside].max() < 2e-3 * measured.max()
+
+
+@pytest.mark.parametrize(
+    ("name", "form", "numbers", "model"),
+    [
+        ("rate_dependent_hood", "dashpot", {"damping": 60.0}, {"damping": 60.0, "share": 0.0}),
+        ("hood_bottoming", "catalogue", {"clearance": 0.03, "stiffness": 2e5},
+         {"clearance": 0.03, "stiffness": 2e5, "power": 1.0}),
+        ("hood_yield", "catalogue", {"force": 2800.0, "remaining": 0.2},
+         {"force": 2800.0, "remaining": 0.2}),
+    ],
+)  # fmt: skip
+def test_generator_and_model_agree_on_effects(
+    tmp_path: Path, name: str, form: str, numbers: dict[str, float], model: dict[str, float]
+) -> None:
+    make_tests(tmp_path / "m", [Hidden(name, form, numbers)], 1, QUIET)
+    data = load_measured(tmp_path / "m")
+    curve = [list(knot) for knot in CURVE]
+    extended = load_model("headform", {"hood_curve": curve}, {name: model})
+    test = data.tests["test"].iloc[0]
+    time, measured = data.signal(test, "head_acceleration", "g")
+    speed = float(data.tests["impact_speed"].iloc[0])
+    run = extended.run({"impact_speed": speed, "headform_mass": 2.5, "hood_unloading_ratio": 7.0})
+    head = run.histories["head"]
+    ours = np.interp(time, head.time, head.channels["acceleration"])
+    assert np.abs(ours - measured).max() < 0.02 * measured.max()
+
+
+def test_what_is_hidden_depends_on_the_seed_alone() -> None:
+    for kind in KINDS:
+        assert draw(3, kind) == draw(3, kind)
+    assert draw(1, "none") == []
+    assert {h.name for k in range(40) for h in draw(k, "catalogue")} == set(CATALOGUE)
+    assert {h.name for k in range(40) for h in draw(k, "outside")} == {
+        make(np.random.default_rng(0)).name for make in OUTSIDE
+    }
+    assert all(len(draw(k, "pair")) == 2 for k in range(5))
+
+
+def trial(tmp: Path, hidden: list[Hidden], seed: int, monkeypatch: pytest.MonkeyPatch) -> Outcome:
+    monkeypatch.setattr("studies.validation.diagnosis.trial.draw", lambda _seed, _kind: hidden)
+    return run_trial(Trial(seed, "catalogue", force=False))
+
+
+@pytest.mark.parametrize(
+    "hidden",
+    [
+        Hidden("sensor_gain", "catalogue", {"factor": 1.06}),
+        Hidden("rate_dependent_hood", "dashpot", {"damping": 40.0}),
+        Hidden("sensor_saturation", "catalogue", {"limit": 110.0}),
+        Hidden("hood_bottoming", "catalogue", {"clearance": 0.03, "stiffness": 2e5}),
+    ],
+    ids=lambda h: h.name,
+)
+def test_an_effect_of_the_catalogue_is_named(
+    tmp_path: Path, hidden: Hidden, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    outcome = trial(tmp_path, [hidden], 21, monkeypatch)
+    assert outcome.size > 2.0
+    assert outcome.cause == hidden.name
+    assert outcome.second is None
+
+
+@pytest.mark.parametrize(
+    "hidden",
+    [Hidden("ageing", "", {"loss": 0.01}), Hidden("cable", "", {"size": 4.0})],
+    ids=lambda h: h.name,
+)
+def test_an_effect_outside_the_catalogue_is_not_named(
+    tmp_path: Path, hidden: Hidden, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    outcome = trial(tmp_path, [hidden], 22, monkeypatch)
+    assert outcome.detected
+    assert outcome.named == ()
+
+
+def test_nothing_hidden_nothing_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    outcome = trial(tmp_path, [], 23, monkeypatch)
+    assert not outcome.detected
+    assert outcome.size == 0.0
+
+
+def outcome_of(kind: str, names: tuple[str, ...], cause: str | None, **more: object) -> Outcome:
+    values: dict[str, object] = {
+        "trial": Trial(1, kind, force=False), "hidden": names, "names": names, "size": 3.0,
+        "p_value": 0.5 if cause is None else 0.001, "cause": cause, "ambiguous": (),
+        "second": None, "second_ambiguous": (), "flagged": False, "why": "", "seconds": 1.0,
+    }  # fmt: skip
+    return Outcome(**(values | more))  # type: ignore[arg-type]
+
+
+def test_rates_count_what_they_say() -> None:
+    outcomes = [
+        outcome_of("none", (), None),
+        outcome_of("none", (), "sensor_gain"),
+        outcome_of("catalogue", ("sensor_gain",), "sensor_gain"),
+        outcome_of("catalogue", ("sensor_gain",), "speed_bias"),
+        outcome_of("catalogue", ("time_scale",), "speed_bias",
+                   ambiguous=("speed_bias", "time_scale")),
+        outcome_of("outside", ("cable",), "unexplained"),
+        outcome_of("outside", ("cable",), "sensor_filter"),
+        outcome_of("pair", ("sensor_gain", "mass_error"), "sensor_gain", second="mass_error"),
+    ]  # fmt: skip
+    found = analyse(outcomes)
+    rates = {key: row["value"] for key, row in found["rates"].items()}
+    assert rates["false_alarms"] == 0.5
+    assert rates["detection"] == 1.0
+    assert rates["truth_in_set"] == pytest.approx(2.0 / 3.0)
+    assert rates["single_wrong"] == pytest.approx(1.0 / 3.0)
+    assert rates["outside_named"] == 0.5
+    assert rates["pair_both"] == 1.0
+    assert found["confusion"]["sensor_gain"] == {"sensor_gain": 1, "speed_bias": 1}
+    assert found["confusion"]["nothing"] == {"adequate": 1, "sensor_gain": 1}
+
+
+def test_a_plan_has_every_kind_and_about_the_number_asked_for() -> None:
+    trials = plan(200)
+    assert {t.kind for t in trials} == set(KINDS)
+    assert 190 <= len(trials) <= 210
+    assert len(set(trials)) == len(trials)
+    assert {target.key for target in TARGETS} >= {"false_alarms", "single_wrong", "pair_both"}

@@ -1,0 +1,257 @@
+"""``mcstudy diagnose``: from a folder of tests to an answer, a report and an extended model."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mcstudy.config import MonteCarloStudy, load_study
+from mcstudy.errors import UserError
+from mcstudy.results import ResultsFolder
+from studies.api import run_study
+from studies.diagnosis.study import diagnose
+from studies.validation.diagnosis.hidden_effects import Hidden, Laboratory, make_tests
+
+LABORATORY = Laboratory(tests=10)
+Change = Callable[[Path], None]
+
+
+@pytest.fixture(scope="module")
+def gain(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ResultsFolder, dict[str, Any]]:
+    """A diagnosis of tests whose accelerometer reads 8 % too high."""
+    root = tmp_path_factory.mktemp("gain")
+    make_tests(root / "data", [Hidden("sensor_gain", "", {"factor": 1.08})], 5, LABORATORY)
+    folder = ResultsFolder(root / "out")
+    return root / "data", folder, diagnose(root / "data", folder, workers=1)
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("plain")
+    make_tests(root / "data", [], 6, LABORATORY)
+    return root / "data"
+
+
+def test_the_answer_names_the_cause_and_its_size(gain: Any) -> None:
+    _, _, answer = gain
+    assert answer["adequate"] is False
+    assert answer["p_value"] <= 0.05
+    assert answer["cause"] == "sensor_gain"
+    assert answer["second_cause"] is None
+    factor = answer["parameters"]["sensor_gain"][0]
+    assert factor["low"] < 1.08 < factor["high"]
+    best = answer["effects"][0]
+    assert best["name"] == "sensor_gain"
+    assert best["log_evidence"] == max(row["log_evidence"] for row in answer["effects"])
+    assert {"name", "log_evidence", "parameters"} <= set(best)
+
+
+def test_the_answer_is_on_disk_with_a_report_that_says_it(gain: Any) -> None:
+    _, folder, answer = gain
+    held = json.loads((folder.path / "diagnosis.json").read_text())
+    assert held == answer
+    report = (folder.path / "report.html").read_text()
+    assert "The accelerometer reads" in report
+    assert "http://" not in report.replace("http://www.w3.org", "")
+    for name in ("pulses_head_acceleration", "where", "evidence", "gain", "conclusions"):
+        assert (folder.path / "figures" / f"{name}.png").stat().st_size > 5000
+
+
+def test_the_gain_is_that_of_held_out_tests(gain: Any) -> None:
+    _, _, answer = gain
+    rows = {(g["score"], g["region"]): g for g in answer["gain"]}
+    for region in ("inside", "beyond"):
+        for score in ("crps_hic15", "log_score", "rmse_head_acceleration", "rmse_hic15"):
+            row = rows[score, region]
+            difference = row["difference"]
+            assert difference["low"] <= difference["value"] <= difference["high"]
+            assert np.isfinite([row["base"], row["extended"], row["gaussian_process"]]).all()
+    assert rows["log_score", "inside"]["difference"]["low"] > 0.0
+
+
+def test_the_extended_model_is_a_study_that_runs(gain: Any, tmp_path: Path) -> None:
+    _, folder, answer = gain
+    text = (folder.path / "extended.toml").read_text()
+    study = load_study(folder.path / "extended.toml")
+    assert isinstance(study, MonteCarloStudy)
+    assert list(study.effects) == ["sensor_gain"]
+    short = text.replace("n = 1000", "n = 200")
+    assert short != text
+    (tmp_path / "short.toml").write_text(short)
+    runs = run_study(tmp_path / "short.toml", out=tmp_path / "out", workers=1).runs()
+    fitted = answer["parameters"]["sensor_gain"][0]
+    assert runs["sensor_gain_factor"].median() == pytest.approx(fitted["value"], rel=0.01)
+
+
+def test_every_cause_has_a_smallest_size_or_none(gain: Any) -> None:
+    _, _, answer = gain
+    causes = {row["cause"] for row in answer["visible"]}
+    assert {"sensor_gain", "hood_bottoming", "rate_dependent_hood", "mass_error"} <= causes
+    gain_seen = next(row for row in answer["visible"] if row["cause"] == "sensor_gain")
+    assert 1.0 < gain_seen["value"] < 1.08
+
+
+def test_an_extra_measurement_is_recommended(gain: Any) -> None:
+    _, _, answer = gain
+    assert answer["worth"]
+    assert "load cell" in " ".join(row["title"] for row in answer["worth"])
+    assert all(row["visibility"] > 0.9 for row in answer["worth"])
+
+
+def test_an_adequate_model_gets_no_cause_and_no_extension(plain: Path, tmp_path: Path) -> None:
+    folder = ResultsFolder(tmp_path / "out")
+    answer = diagnose(plain, folder, workers=1)
+    assert answer["adequate"] is True
+    assert answer["cause"] is None
+    assert answer["p_value"] > 0.05
+    assert (answer["effects"], answer["gain"], answer["conclusions"]) == ([], [], None)
+    assert answer["visible"]
+    assert not (folder.path / "extended.toml").exists()
+    assert "within what is uncertain" in (folder.path / "report.html").read_text()
+
+
+def test_the_same_seed_gives_the_same_answer(plain: Path, tmp_path: Path) -> None:
+    first = diagnose(plain, ResultsFolder(tmp_path / "a"), workers=1, seed=2)
+    second = diagnose(plain, ResultsFolder(tmp_path / "b"), workers=2, seed=2)
+    assert first == second
+
+
+def test_a_model_that_has_the_effect_is_adequate(gain: Any, tmp_path: Path) -> None:
+    # The extended model as the model to be diagnosed: nothing is left to explain.
+    data, folder, _ = gain
+    answer = diagnose(
+        data, ResultsFolder(tmp_path / "out"), model_config=folder.path / "extended.toml", workers=1
+    )
+    assert answer["adequate"] is True
+    assert "sensor_gain" not in {row["cause"] for row in answer["visible"]}
+
+
+def run_command(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "mcstudy.cli", "diagnose", *arguments],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+def test_the_command_prints_one_json_object(plain: Path, tmp_path: Path) -> None:
+    done = run_command(str(plain), "--out", str(tmp_path / "out"), "--json", "--workers", "1")
+    assert done.returncode == 0, done.stderr
+    printed = json.loads(done.stdout)
+    assert printed["analysis"]["adequate"] is True
+
+
+def edit(path: str, change: Callable[[str], str]) -> Change:
+    def apply(folder: Path) -> None:
+        target = folder / path
+        target.write_text(change(target.read_text()))
+
+    return apply
+
+
+def replace_line(path: str, number: int, line: str) -> Change:
+    def change(text: str) -> str:
+        lines = text.splitlines()
+        lines[number - 1] = line
+        return "\n".join(lines) + "\n"
+
+    return edit(path, change)
+
+
+def swap(path: str, old: str, new: str) -> Change:
+    def change(text: str) -> str:
+        assert old in text
+        return text.replace(old, new, 1)
+
+    return edit(path, change)
+
+
+SIGNAL = "signals/t01.csv"
+HEADER = "measured.toml"
+BAD: dict[str, tuple[Change, str]] = {
+    "missing column": (
+        swap("tests.csv", "impact_speed", "speed"),
+        "tests.csv: column 'impact_speed' is missing",
+    ),
+    "unknown unit": (
+        swap(HEADER, 'unit = "m/s"', 'unit = "furlong"'),
+        "inputs.impact_speed.unit: unknown unit",
+    ),
+    "empty signal": (
+        edit(SIGNAL, lambda text: text.splitlines()[0] + "\n"),
+        "t01.csv: line 1: column 'head_acceleration' ends after 0",
+    ),
+    "a NaN": (
+        replace_line(SIGNAL, 7, "-0.0037,nan"),
+        "t01.csv: line 7: column 'head_acceleration' must hold numbers",
+    ),
+    "time runs backwards": (replace_line(SIGNAL, 7, "-0.1,0.0"), "t01.csv: line 7: time must rise"),
+    "two tests of one name": (swap("tests.csv", "t02", "t01"), "is there already"),
+    "unknown model": (
+        swap(HEADER, 'model = "headform"', 'model = "sledge"'),
+        "no model 'sledge'",
+    ),
+    "unknown input": (
+        swap(HEADER, "headform_mass", "sledge_mass"),
+        "fixed.sledge_mass: model 'headform' has no such input",
+    ),
+    "input out of range": (
+        swap(HEADER, "headform_mass = 2.5", "headform_mass = -1.0"),
+        "fixed.headform_mass",
+    ),
+    "unknown channel": (
+        swap(HEADER, "signals.head_acceleration", "signals.head_temperature"),
+        "head_temperature",
+    ),
+    "no such column": (edit(HEADER, lambda t: t + "\n[scalars.order]\nsd = 1.0\n"), "order"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_folder_is_told_in_one_line(plain: Path, tmp_path: Path, name: str) -> None:
+    change, message = BAD[name]
+    copy = tmp_path / "data"
+    (copy / "signals").mkdir(parents=True)
+    for path in plain.rglob("*.*"):
+        if path.is_file():
+            (copy / path.relative_to(plain)).write_text(path.read_text())
+    change(copy)
+    with pytest.raises(UserError) as caught:
+        diagnose(copy, ResultsFolder(tmp_path / "out"), workers=1)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "out" / "diagnosis.json").exists()
+
+
+def test_a_force_computed_from_the_acceleration_is_refused(plain: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "data"
+    (copy / "signals").mkdir(parents=True)
+    for path in plain.rglob("*.*"):
+        if path.is_file():
+            (copy / path.relative_to(plain)).write_text(path.read_text())
+    for path in (copy / "signals").glob("*.csv"):
+        frame = pd.read_csv(path)
+        frame["hood_force"] = 2.5 * 9.80665 * frame["head_acceleration"]
+        frame.to_csv(path, index=False)
+    header = copy / "measured.toml"
+    header.write_text(
+        header.read_text() + '\n[signals.hood_force]\nunit = "N"\nsd = 20.0\nfilter = "CFC1000"\n'
+    )
+    with pytest.raises(UserError, match=r"signals\.hood_force is mass times"):
+        diagnose(copy, ResultsFolder(tmp_path / "out"), workers=1)
+
+
+def test_data_and_results_may_not_share_a_folder(plain: Path) -> None:
+    with pytest.raises(UserError, match="holds the measured data"):
+        diagnose(plain, ResultsFolder(plain), workers=1)
+
+
+def test_bad_data_exit_with_code_two(tmp_path: Path) -> None:
+    done = run_command(str(tmp_path / "nowhere"))
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1

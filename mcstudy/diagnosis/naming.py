@@ -46,9 +46,9 @@ FAR = 0.7
 """Weight of the data below which a fit begins far away."""
 FARTHEST_START = 3.0
 """Score beyond which no fit begins."""
-CLOSE, WORSE = 100.0, 2.0
+CLOSE, WORSE = 60.0, 1.4
 """Log units and factor by which a form, or a second start, may promise less than the best."""
-FEWEST = 8
+FEWEST = 6
 """Forms that are refitted whatever they promise."""
 APART = 0.9
 """Scores that two starts are apart, at least."""

@@ -35,6 +35,11 @@ SECOND = 6.0
 """Log units of evidence that a second cause must add."""
 SINGLES, SECONDS = 30, 12
 """Forms that are refitted, as a single cause and as a second one."""
+SECOND_SHARE = 0.02
+"""Share of the first cause's evidence that a second one must add: beside a large effect even the
+best form of it leaves a little."""
+ALMOST_ALL = 0.98
+"""Share of the explained misfit from which no second cause is looked for."""
 PAIRS = 2
 """Causes, best first, with which a second one is tried."""
 
@@ -158,6 +163,9 @@ def _judge(
     )
     if left.p_value >= STRUCTURE:
         return alone
+    flagged = replace(alone, why="one cause explains most of the misfit; something remains")
+    if left.share >= ALMOST_ALL:
+        return flagged
     pair = _best_pair(problem, causes, empty, candidates, workers)
     if pair is not None:
         return replace(
@@ -171,7 +179,7 @@ def _judge(
             why="two causes explain the misfit together",
         )
     if left.share >= MOST_OF_IT:
-        return replace(alone, why="one cause explains most of the misfit; something remains")
+        return flagged
     return replace(nothing, remainder=left, why="the best cause leaves structure behind")
 
 
@@ -212,6 +220,9 @@ def _best_pair(
             continue
         left = examine(problem, empty.layouts, empty.base, seconds[0].fitted)
         best = _Pair(first, seconds, left)
-    if best is None or best.seconds[0].log_evidence < SECOND:
+    if best is None:
+        return None
+    least = max(SECOND, SECOND_SHARE * best.first.log_evidence)
+    if best.seconds[0].log_evidence < least:
         return None
     return best if best.remainder.p_value >= STRUCTURE else None

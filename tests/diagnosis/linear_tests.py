@@ -51,10 +51,10 @@ class Linear:
         return Observation({"head_acceleration": (time, values)}, {})
 
 
+SIZE = Parameter("size", "1", "", normal, 0.0, "normal")
 BUMP = Cause(
-    (Form("bump", "bump", {}, (Parameter("size", "1", "", normal, 0.0, "normal"),)),)
-    "size", "late in the pulse", (), "nothing",
-)  # fmt: skip
+    "bump", "a bump", (Form("bump", "bump", {}, (SIZE,)),), "size", "late in the pulse", (), "no"
+)
 
 
 def make_problem(

@@ -126,6 +126,16 @@ def _size(
     for name, effects in (("with", hidden), ("without", ())):
         make_tests(scratch / name, effects, seed, quiet, header_of=laboratory)
     twin, plain = _problem(scratch / "with"), _problem(scratch / "without")
+    plain = replace(
+        plain,
+        tests=tuple(
+            replace(test, signals=tuple(
+                replace(s, sd=real.sd, correlation=0.0)
+                for s, real in zip(test.signals, layout.test.signals, strict=True)
+            ))
+            for test, layout in zip(plain.tests, finding.layouts, strict=True)
+        ),
+    )  # fmt: skip
     layouts, fitted = fit_base(plain)
     columns = [_difference(layout, i, twin, fitted)[:, None] for i, layout in enumerate(layouts)]
     # The repeatability of the real set, not that of its noise-free twin.

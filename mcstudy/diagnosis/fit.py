@@ -142,6 +142,7 @@ def fit(
     *,
     exact: bool = True,
     weight: float = 1.0,
+    most: int = MOST_STEPS,
 ) -> Fit:
     """Return the most probable fit near a start.
 
@@ -153,6 +154,7 @@ def fit(
     exact : whether the slopes must be those of the most probable scores in the end.
     weight : of the data against the priors; below 1 a misfit is taken less seriously, so that a
         fit from far away does not end in the wrong valley.
+    most : steps.
 
     Raises
     ------
@@ -166,12 +168,12 @@ def fit(
         raise FitError("a run fails where the fit begins")
     misfit = _misfit(layouts, seen, scores, scatter, weight)
     slopes, fresh = known, False
-    for step in range(MOST_STEPS + 1):
+    for step in range(most + 1):
         if slopes is None:
             slopes, fresh = _simulate_slopes(problem, forms, layouts, scores, seen, scatter), True
         residuals, own = _expand(layouts, seen, scores, slopes, scatter)
         system = _System(residuals, own, slopes.shared, scores, weight)
-        last = step == MOST_STEPS
+        last = step == most
         better = None
         if system.expected_gain >= CONVERGED and not last:
             better = _descend(problem, forms, layouts, scores, system, scatter, misfit, weight)

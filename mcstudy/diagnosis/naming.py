@@ -1,6 +1,5 @@
 """Which cause: every one refitted in all its forms, ranked by evidence, with an open set."""
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -48,10 +47,12 @@ FARTHEST_START = 3.0
 """Score beyond which no fit begins."""
 CLOSE, WORSE = 60.0, 1.4
 """Log units and factor by which a form, or a second start, may promise less than the best."""
+HOPELESS = 1.5
+"""Factor on the best misfit beyond which a form is not fitted any further."""
+STAGE_STEPS = 6
+"""Steps of a first fit."""
 FEWEST = 6
 """Forms that are refitted whatever they promise."""
-APART = 0.9
-"""Scores that two starts are apart, at least."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,11 @@ class Survey:
     misfits: tuple[float, ...]
     starts: tuple[Scores, ...]
 
+    @property
+    def far(self) -> bool:
+        """Whether a fit begins far from the data."""
+        return self.weight < FAR
+
 
 def survey(
     problem: Problem,
@@ -125,70 +131,57 @@ def survey(
         most probable scores of a wrong model away from those of the right one.
     form : the one to add.
     """
-    tried: list[tuple[float, Scores]] = []
-    changes = 0.0
     samples = sum(r.size for r in centres[0].residuals)
     least = min(solve(centre, centre.residuals, 1.0)[1] for centre in centres)
     weight = min(1.0, float(np.sqrt(0.5 * samples / least)))
-    for centre, scores in itertools.product(centres, score_grid(form)):
-        start = Scores(np.concatenate([centre.scores.shared, scores]), centre.scores.own)
-        residuals = residuals_at(problem, layouts, (*forms, form), start, SURVEY)
-        if residuals is None:
-            continue
-        for found, before in zip(residuals, centre.residuals, strict=True):
-            changes = max(changes, float(np.sum((found - before) ** 2)))
-        solved, misfit = solve(centre, residuals, weight)
-        shared = np.clip(solved.shared, -FARTHEST_START, FARTHEST_START)
-        own = tuple(np.clip(z, -FARTHEST_START, FARTHEST_START) for z in solved.own)
-        whole = misfit + 0.5 * float(scores @ scores)
-        tried.append((whole, Scores(np.concatenate([shared, scores]), own)))
+    best: list[tuple[float, Scores]] = []
+    changes = 0.0
+    for centre in centres:
+        tried: list[tuple[float, Scores]] = []
+        for scores in score_grid(form, fine=weight < FAR):
+            start = Scores(np.concatenate([centre.scores.shared, scores]), centre.scores.own)
+            residuals = residuals_at(problem, layouts, (*forms, form), start, SURVEY)
+            if residuals is None:
+                continue
+            for found, before in zip(residuals, centre.residuals, strict=True):
+                changes = max(changes, float(np.sum((found - before) ** 2)))
+            solved, misfit = solve(centre, residuals, weight)
+            shared = np.clip(solved.shared, -FARTHEST_START, FARTHEST_START)
+            own = tuple(np.clip(z, -FARTHEST_START, FARTHEST_START) for z in solved.own)
+            whole = misfit + 0.5 * float(scores @ scores)
+            tried.append((whole, Scores(np.concatenate([shared, scores]), own)))
+        if tried:
+            best.append(min(tried, key=lambda entry: entry[0]))
     if changes < UNSEEN:
         return None
-    tried.sort(key=lambda entry: entry[0])
-    free = len(form.free)
-    chosen = [tried[0]]
-    for misfit, start in tried[1:]:
-        apart = np.abs(start.shared[-free:] - chosen[0][1].shared[-free:]).max(initial=0.0)
-        if misfit < WORSE * tried[0][0] + CLOSE and apart >= APART:
-            chosen.append((misfit, start))
-            break
-    return Survey(form, weight, tuple(m for m, _ in chosen), tuple(start for _, start in chosen))
+    best.sort(key=lambda entry: entry[0])
+    return Survey(form, weight, tuple(m for m, _ in best), tuple(start for _, start in best))
 
 
-def _approach(
-    problem: Problem,
-    layouts: Sequence[Layout],
-    forms: tuple[Form, ...],
-    start: Scores,
-    weight: float,
-) -> Fit:
-    """Return a fit from far away: the data gain weight as the fit comes near.
-
-    Raises
-    ------
-    FitError
-        If a run fails at the start.
-    """
-    for stage in (weight, np.sqrt(weight)) if weight < FAR else ():
-        found = fit(problem, layouts, forms, start, SURVEY, exact=False, weight=stage)
-        # What tests put down to nuisances while the shared values were wrong is forgotten.
-        start = Scores(found.scores.shared, tuple(np.zeros_like(z) for z in start.own))
-    return fit(problem, layouts, forms, start, SURVEY, exact=False)
-
-
-def fit_form(
+def approach(
     problem: Problem, layouts: Sequence[Layout], forms: tuple[Form, ...], surveyed: Survey
 ) -> Fit | None:
-    """Return the best fit of forms and one more; None if it cannot run."""
+    """Return a first fit of forms and one more; None if it cannot run.
+
+    From far away the data gain weight as the fit comes near.
+    """
+    forms = (*forms, surveyed.form)
     best: Fit | None = None
     for start in surveyed.starts:
         try:
-            found = _approach(problem, layouts, (*forms, surveyed.form), start, surveyed.weight)
+            for stage in (surveyed.weight, np.sqrt(surveyed.weight)) if surveyed.far else ():
+                found = fit(
+                    problem, layouts, forms, start, SURVEY,
+                    exact=False, weight=stage, most=STAGE_STEPS,
+                )  # fmt: skip
+                # What tests put down to nuisances while the shared values were wrong is forgotten.
+                start = Scores(found.scores.shared, tuple(np.zeros_like(z) for z in start.own))
+            found = fit(problem, layouts, forms, start, SURVEY, exact=False, most=STAGE_STEPS)
         except FitError:
             continue
         if best is None or found.log_evidence > best.log_evidence:
             best = found
-    return None if best is None else settle(problem, layouts, best)
+    return best
 
 
 def rank_causes(
@@ -225,13 +218,16 @@ def rank_causes(
         for k, s in enumerate(seen[:most])
         if k < FEWEST or s.misfits[0] < WORSE * seen[0].misfits[0] + CLOSE
     ]
-    fits = pool(delayed(fit_form)(problem, layouts, base.forms, s) for s in promising)
+    first = pool(delayed(approach)(problem, layouts, base.forms, s) for s in promising)
+    reached = [found for found in first if found is not None]
+    least = min((found.misfit for found in reached), default=0.0)
+    # Only what is not hopeless beside the best is worth its repeatability.
+    kept = [found for found in reached if found.misfit < HOPELESS * least + CLOSE]
+    fits = pool(delayed(settle)(problem, layouts, found) for found in kept)
     candidates = []
     for cause in causes:
         own_fits = [
-            (tried.form, fitted)
-            for tried, fitted in zip(promising, fits, strict=True)
-            if tried.form.cause == cause.name and fitted is not None
+            (fitted.forms[-1], fitted) for fitted in fits if fitted.forms[-1].cause == cause.name
         ]
         if not own_fits:
             continue

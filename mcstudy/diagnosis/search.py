@@ -40,6 +40,8 @@ SECOND_SHARE = 0.02
 best form of it leaves a little."""
 ALMOST_ALL = 0.98
 """Share of the explained misfit from which no second cause is looked for."""
+RIVAL = 0.5
+"""Share of the best cause's evidence from which another one is tried as the first of two."""
 PAIRS = 2
 """Causes, best first, with which a second one is tried."""
 
@@ -209,6 +211,8 @@ def _best_pair(
     """Return the pair of causes that explains the misfit, if one does and no single one can."""
     best: _Pair | None = None
     for first in candidates[:PAIRS]:
+        if first.log_evidence < RIVAL * candidates[0].log_evidence:
+            continue
         seconds = rank_causes(problem, empty.layouts, first.fitted, causes, workers, SECONDS)
         if not seconds:
             continue

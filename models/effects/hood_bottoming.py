@@ -16,6 +16,9 @@ REFERENCE = 0.010
 DEPTHS = (0.002, 0.004, 0.007, 0.01, 0.014, 0.02, 0.04)
 """Depths (m) beyond the clearance at which a curved law is cut into straight pieces."""
 
+NEAREST = 1e-6
+"""m from a knot of the curve within which none is added."""
+
 
 def apply(curve: ForceCurve, parameters: Mapping[str, float]) -> ForceCurve:
     """Return the hood's loading curve with the effect."""
@@ -23,7 +26,9 @@ def apply(curve: ForceCurve, parameters: Mapping[str, float]) -> ForceCurve:
     if parameters["stiffness"] == 0.0:
         return curve
     depths = np.array([0.0, *(DEPTHS if power > 1.0 else DEPTHS[-1:])])
-    x = np.union1d(curve.penetration, clearance + depths)
+    added_knots = clearance + depths
+    apart = np.abs(added_knots[:, None] - curve.penetration).min(axis=1) > NEAREST
+    x = np.union1d(curve.penetration, added_knots[apart])
     depth = np.maximum(x - clearance, 0.0)
     added = parameters["stiffness"] * depth * (depth / REFERENCE) ** (power - 1.0)
     return replace(curve, penetration=x, force=curve.at(x) + added)

@@ -213,3 +213,11 @@ def test_effects_act_together() -> None:
     assert both.outputs["hic15"] == pytest.approx(
         1.1**2.5 * struck(impact_speed=9.45).outputs["hic15"], rel=1e-9
     )
+
+
+@pytest.mark.parametrize("clearance", [0.015, 0.035, 0.035 + 1e-9, 0.1])
+@pytest.mark.parametrize("power", [1.0, 2.0])
+def test_a_structure_below_the_hood_may_begin_at_a_knot(clearance: float, power: float) -> None:
+    # Depths beyond the clearance that fall on a knot of the curve, to rounding.
+    numbers = {"clearance": clearance, "stiffness": 2e5, "power": power}
+    assert struck({"hood_bottoming": numbers}).status == "ok"

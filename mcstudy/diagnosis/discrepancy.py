@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.fit import Fit, Scores, Slopes
+from mcstudy.diagnosis.fit import Fit, Slopes
 from mcstudy.diagnosis.layout import Layout, Scatter
 from mcstudy.diagnosis.marginal import Marginal
+from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.templates import Shapes, smooth_discrepancy
 
 Array = NDArray[np.float64]

@@ -5,6 +5,7 @@ nuisances by Gauss-Newton; the matrix of slopes is block-arrow, so tests are eli
 The evidence is Laplace's approximation.
 """
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcstudy.diagnosis.layout import Layout, Scatter
+from mcstudy.diagnosis.normal_equations import NormalEquations, Scores
 from mcstudy.diagnosis.problem import FARTHEST, Form, Observation, Problem, value_at
 
 Array = NDArray[np.float64]
@@ -25,14 +27,6 @@ LINEAR = 0.7
 """Share of the expected gain from which slopes are good enough to go on with."""
 LONGEST = 1.5
 """Largest move of a shared score in one step."""
-
-
-@dataclass(frozen=True)
-class Scores:
-    """Scores of the shared values (p,) and of each test's nuisances."""
-
-    shared: Array
-    own: tuple[Array, ...]
 
 
 @dataclass(frozen=True)
@@ -172,18 +166,21 @@ def fit(
         if slopes is None:
             slopes, fresh = _simulate_slopes(problem, forms, layouts, scores, seen, scatter), True
         residuals, own = _expand(layouts, seen, scores, slopes, scatter)
-        system = _System(residuals, own, slopes.shared, scores, weight)
+        system = NormalEquations(own, slopes.shared, weight)
+        planned = system.solve(residuals, scores)
         last = step == most
         better = None
-        if system.expected_gain >= CONVERGED and not last:
-            better = _descend(problem, forms, layouts, scores, system, scatter, misfit, weight)
+        if planned.expected_gain >= CONVERGED and not last:
+            better = _descend(
+                problem, forms, layouts, scores, planned.move, scatter, misfit, weight
+            )
         if better is None:
             if fresh or last or not exact:
                 break
             slopes = None
             continue
         moved, seen, lower = better
-        if misfit - lower < LINEAR * system.expected_gain:
+        if misfit - lower < LINEAR * planned.expected_gain:
             slopes = None
         scores, misfit, fresh = moved, lower, False
     assert slopes is not None
@@ -209,6 +206,16 @@ class Centre:
     residuals: tuple[Array, ...]
     own_slopes: tuple[Array, ...]
     shared_slopes: tuple[Array, ...]
+
+    def equations(self, weight: float) -> NormalEquations:
+        """Return the normal equations at a weight of the data, made once."""
+        if weight not in self._made:
+            self._made[weight] = NormalEquations(self.own_slopes, self.shared_slopes, weight)
+        return self._made[weight]
+
+    @functools.cached_property
+    def _made(self) -> dict[float, NormalEquations]:
+        return {}
 
 
 def linearise(
@@ -249,13 +256,13 @@ def solve(centre: Centre, residuals: Sequence[Array], weight: float) -> tuple[Sc
 
     ``weight`` is that of the data against the priors.
     """
-    system = _System(residuals, centre.own_slopes, centre.shared_slopes, centre.scores, weight)
-    move = system.step()
-    own = tuple(z + d for z, d in zip(centre.scores.own, move.own, strict=True))
+    planned = centre.equations(weight).solve(residuals, centre.scores)
+    own = tuple(z + d for z, d in zip(centre.scores.own, planned.move.own, strict=True))
     squares = weight**2 * sum(float(r @ r) for r in residuals)
     squares += float(centre.scores.shared @ centre.scores.shared)
     squares += sum(float(z @ z) for z in centre.scores.own)
-    return Scores(centre.scores.shared + move.shared, own), 0.5 * squares - system.expected_gain
+    moved = Scores(centre.scores.shared + planned.move.shared, own)
+    return moved, 0.5 * squares - planned.expected_gain
 
 
 def _misfit(
@@ -329,62 +336,17 @@ def _simulate_slopes(
     return Slopes(tuple(doubtful), tuple(shared))
 
 
-class _System:
-    """The normal equations, each test's own nuisances eliminated."""
-
-    def __init__(
-        self,
-        residuals: Sequence[Array],
-        own: Sequence[Array],
-        shared: Sequence[Array],
-        scores: Scores,
-        weight: float = 1.0,
-    ) -> None:
-        p = scores.shared.size
-        self.schur = np.eye(p)
-        right = -scores.shared.copy()
-        self._blocks: list[Array] = []
-        self.log_determinant = 0.0
-        gain = 0.0
-        for r, a, b, z in zip(
-            (weight * r for r in residuals),
-            (weight * a for a in own),
-            (weight * b for b in shared),
-            scores.own,
-            strict=True,
-        ):
-            block = np.eye(a.shape[1]) + a.T @ a
-            cross = a.T @ b
-            pull = a.T @ r - z
-            solved = np.linalg.solve(block, np.column_stack([cross, pull]))
-            self.schur += b.T @ b - cross.T @ solved[:, :p]
-            right += b.T @ r - cross.T @ solved[:, p]
-            self.log_determinant += float(np.linalg.slogdet(block)[1])
-            gain += float(pull @ solved[:, p])
-            self._blocks.append(np.asarray(solved))
-        self.shared: Array = np.asarray(np.linalg.solve(self.schur, right)) if p else np.zeros(0)
-        self.log_determinant += float(np.linalg.slogdet(self.schur)[1]) if p else 0.0
-        self.expected_gain = 0.5 * (gain + float(right @ self.shared))
-
-    def step(self) -> Scores:
-        """Return the move of all scores."""
-        p = self.shared.size
-        own = tuple(np.asarray(b[:, p] - b[:, :p] @ self.shared) for b in self._blocks)
-        return Scores(self.shared, own)
-
-
 def _descend(
     problem: Problem,
     forms: Sequence[Form],
     layouts: Sequence[Layout],
     scores: Scores,
-    system: _System,
+    move: Scores,
     scatter: Scatter,
     misfit: float,
     weight: float,
 ) -> tuple[Scores, list[Observation], float] | None:
     """Return scores that fit better along the step, with what was seen there."""
-    move = system.step()
     longest = float(np.abs(move.shared).max(initial=0.0))
     share = min(1.0, LONGEST / longest) if longest > 0.0 else 1.0
     for _ in range(6):

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcstudy.diagnosis.discrepancy import Discrepancy, fit_discrepancy
-from mcstudy.diagnosis.fit import Fit, FitError, Scores, Slopes, fit, observe_tests
+from mcstudy.diagnosis.fit import Fit, FitError, Slopes, fit, observe_tests
 from mcstudy.diagnosis.layout import Layout, Scatter
+from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.diagnosis.screening import estimate_scatter
 from mcstudy.diagnosis.templates import smooth_discrepancy

@@ -12,7 +12,6 @@ from mcstudy.diagnosis.fit import (
     Centre,
     Fit,
     FitError,
-    Scores,
     fit,
     linearise,
     residuals_at,
@@ -20,6 +19,7 @@ from mcstudy.diagnosis.fit import (
     solve,
 )
 from mcstudy.diagnosis.layout import Layout, Scatter
+from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Cause, Form, Problem
 from mcstudy.diagnosis.screening import estimate_scatter, remaining
 from mcstudy.diagnosis.templates import (

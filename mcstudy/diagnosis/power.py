@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.fit import Fit, FitError, Scores, fit, linearise, observe_tests
+from mcstudy.diagnosis.fit import Fit, FitError, fit, linearise, observe_tests
 from mcstudy.diagnosis.layout import Layout
+from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import (
     Cause,
     Form,

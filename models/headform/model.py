@@ -2,8 +2,8 @@
 
 import hashlib
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,51 +19,38 @@ from models.contact.law import (
     interpolate_law,
     law_of,
 )
-from models.criteria import clip_level, head_injury_criterion
 from models.criteria.units import STANDARD_GRAVITY
 from models.declaration import read_inputs, read_outputs, run_rows
 from models.effects.chain import build_chain
 from models.effects.reading import Reading, record_reading
 from models.effects.registry import effects_of
+from models.headform import outcome
 from models.headform.contact import HeadformContact
 from models.headform.impact import (
     COLUMNS,
     DEEPEST,
-    END_SLIDE,
-    END_SPIN,
     END_TIME,
     NORMAL,
-    PENETRATION,
-    RATE,
-    REBOUND,
     SAMPLES,
-    SLIDE,
-    SPENT,
-    SPIN,
     SUMMARY,
     TANGENTIAL,
     Impactor,
     Surface,
     strike,
 )
+from models.headform.outcome import QUIET, SAMPLING_RATE, Test
 from models.protocol import (
     OK,
     Batch,
-    History,
     Input,
     Output,
     Run,
     complete_inputs,
-    history_of,
 )
 from models.vehicle.profile import load_vehicle
 
 Array = NDArray[np.float64]
 
-SAMPLING_RATE = 20_000.0
-"""Hz of the accelerometer (SAE J211 asks for ten times the channel frequency class)."""
-QUIET = 0.005
-"""s of flight kept before and after the contact, so that the filter has room."""
 LONGEST_CONTACT = 1.0
 """s of contact after which a run counts as failed."""
 FINEST = 5
@@ -88,18 +75,6 @@ _OUTPUTS = read_outputs(_TABLE)
 def headform_names() -> tuple[str, ...]:
     """Return the names of the headforms in the data file."""
     return tuple(data.load("headforms.toml")["headforms"])
-
-
-@dataclass(frozen=True)
-class _Test:
-    """One test: impactor, initial speeds, what the loop left behind and the accelerometer read."""
-
-    impactor: Impactor
-    speeds: tuple[float, float]
-    record: Array
-    acceleration: Array
-    summary: Array
-    dent: tuple[float, float]
 
 
 class HeadformModel:
@@ -244,7 +219,7 @@ class HeadformModel:
         test = self._strike(values)
         status, measured = self._judge(test, outputs)
         ended = "separation" if status == OK else status
-        return Run(values, status, ended, measured, self._histories(test, channels))
+        return Run(values, status, ended, measured, outcome.histories(test, channels))
 
     def run_batch(self, rows: Array) -> Batch:
         """Run rows of inputs.
@@ -275,7 +250,7 @@ class HeadformModel:
         )
         return self._chain.act("curve", scaled, values)
 
-    def _strike(self, given: Mapping[str, float]) -> _Test:
+    def _strike(self, given: Mapping[str, float]) -> Test:
         values = self._chain.act("inputs", given, given)
         curve = self.hood_curve(values)
         contact = self._chain.act(
@@ -318,7 +293,7 @@ class HeadformModel:
         deepest = summary[DEEPEST]
         hood = float(interpolate_law(laws, 0, count, SURFACE, deepest))
         kept = record[: int(summary[SAMPLES])].copy()
-        return _Test(
+        return Test(
             impactor=impactor,
             speeds=speeds,
             record=kept,
@@ -337,7 +312,7 @@ class HeadformModel:
         return record_reading(self._chain, values, felt, SAMPLING_RATE, origin=quiet)
 
     def _judge(
-        self, test: _Test, wanted: Collection[str] | None = None
+        self, test: Test, wanted: Collection[str] | None = None
     ) -> tuple[str, dict[str, float]]:
         """Return the status of a test and its outputs, or those that are wanted."""
         names = [item.name for item in _OUTPUTS if wanted is None or item.name in wanted]
@@ -346,83 +321,8 @@ class HeadformModel:
             return NOT_FINITE, empty
         if math.isnan(test.summary[END_TIME]):
             return TIME_LIMIT, empty
-        measures = self._measures(test) if names else {}
+        measures = outcome.measures(test) if names else {}
         return OK, {name: measures[name]() for name in names}
-
-    def _measures(self, test: _Test) -> dict[str, Callable[[], float]]:
-        """Return how each output is had from a test that ended."""
-        acceleration = np.hypot(*test.acceleration.T)
-        time = np.arange(acceleration.size) / SAMPLING_RATE
-        record, summary = test.record, test.summary
-        energy = 0.5 * test.impactor.mass * (test.speeds[0] ** 2 + test.speeds[1] ** 2)
-        left = 0.5 * test.impactor.mass * (summary[REBOUND] ** 2 + summary[END_SLIDE] ** 2)
-        left += 0.5 * test.impactor.inertia * summary[END_SPIN] ** 2
-        return {
-            "hic15": lambda: head_injury_criterion(time, acceleration, 0.015)[0],
-            "hic36": lambda: head_injury_criterion(time, acceleration, 0.036)[0],
-            "clip_3ms": lambda: clip_level(time, acceleration),
-            "clip_3ms_consecutive": lambda: clip_level(time, acceleration, mode="consecutive"),
-            "peak_head_acceleration": lambda: float(acceleration.max()),
-            "peak_force": lambda: float(record[:, NORMAL].max()),
-            "hood_intrusion": lambda: test.dent[0],
-            "permanent_dent": lambda: test.dent[1],
-            "rebound_speed": lambda: float(summary[REBOUND]),
-            "contact_duration": lambda: float(summary[END_TIME]),
-            "head_angular_velocity": lambda: float(np.abs(record[:, SPIN]).max()),
-            "energy_residual": lambda: float((energy - summary[SPENT] - left) / energy),
-        }
-
-    def _histories(self, test: _Test, wanted: Collection[str] | None) -> dict[str, History]:
-        """Return the histories of headform and hood, or those wanted; time 0 is first contact."""
-        quiet = round(QUIET * SAMPLING_RATE)
-        record, last = test.record, test.record[-1]
-        before = np.arange(-quiet, 0) / SAMPLING_RATE
-        after = np.arange(1, quiet + 1) / SAMPLING_RATE
-        rate, slide = test.speeds
-
-        def padded(column: int, first: Array | float, end: Array | float) -> Array:
-            longer = np.empty(record.shape[0] + 2 * quiet)
-            longer[:quiet] = first
-            longer[quiet:-quiet] = record[:, column]
-            longer[-quiet:] = end
-            return longer
-
-        sources: dict[str, dict[str, tuple[str, Callable[[], Array]]]] = {
-            "head": {
-                "acceleration": ("g", lambda: _resultant(test.acceleration)),
-                "acceleration_normal": ("g", lambda: test.acceleration[:, 0]),
-                "acceleration_tangential": ("g", lambda: test.acceleration[:, 1]),
-                "velocity_normal": ("m/s", lambda: padded(RATE, rate, last[RATE])),
-                "velocity_tangential": ("m/s", lambda: padded(SLIDE, slide, last[SLIDE])),
-                "angular_velocity": ("rad/s", lambda: padded(SPIN, 0.0, last[SPIN])),
-            },
-            "hood": {
-                "force": ("N", lambda: padded(NORMAL, 0.0, 0.0)),
-                "penetration": (
-                    "m",
-                    lambda: padded(
-                        PENETRATION, before * rate, last[PENETRATION] + after * last[RATE]
-                    ),
-                ),
-            },
-        }
-        time = np.arange(-quiet, record.shape[0] + quiet) / SAMPLING_RATE
-        found = {}
-        for group, channels in sources.items():
-            chosen = {
-                name: (source(), unit)
-                for name, (unit, source) in channels.items()
-                if wanted is None or f"{group}_{name}" in wanted
-            }
-            if chosen:
-                found[group] = history_of(time, chosen)
-        return found
-
-
-def _resultant(acceleration: Array) -> Array:
-    """Return the resultant of (n, 2); with nothing along the hood it keeps the normal's sign."""
-    normal, tangential = acceleration.T
-    return np.asarray(np.hypot(normal, tangential) if np.any(tangential) else normal.copy())
 
 
 def _in_series(skin: ForceCurve | None, compliance: float, force: float) -> ForceCurve:

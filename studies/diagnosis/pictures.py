@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.fit import Fit, Scores, observe_tests
+from mcstudy.diagnosis.fit import Fit, observe_tests
 from mcstudy.diagnosis.layout import Layout
+from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.statistics import REACH
 

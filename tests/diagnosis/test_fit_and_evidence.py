@@ -5,10 +5,11 @@ import pytest
 from linear_tests import BUMP, make_problem
 from scipy import stats
 
-from mcstudy.diagnosis.fit import Fit, Scores, fit, start_scores
+from mcstudy.diagnosis.fit import Fit, fit, start_scores
 from mcstudy.diagnosis.layout import Layout, Scatter, lay_out
 from mcstudy.diagnosis.marginal import Marginal, log_bayes_factor, quadratic_form
 from mcstudy.diagnosis.naming import rank_causes, settle
+from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.diagnosis.search import fit_base, search
 

@@ -240,7 +240,7 @@ DAMAGE: dict[str, tuple[dict[str, Any], str]] = {
     "text in a signal": ({SIGNAL: ramp(0.0, 1e-4, 50) + "0.1,abc,1\n"}, "'head_acceleration' must"),
     "text in time": ({SIGNAL: ramp(0.0, 1e-4, 50) + "now,1,1\n"}, "column 'time' must hold"),
     "ragged": ({SIGNAL: ramp(0.0, 1e-4, 50) + "0.1,1,1,1,1\n"}, "A-1.csv: line 52 has 5 fields"),
-    "only nan": ({SIGNAL: NUMBERS.replace("0.1,1", "0.1,nan")}, "A-1.csv: line 2: .* must hold numbers"),
+    "only nan": ({SIGNAL: NUMBERS.replace("0.1,1", "0.1,nan")}, "line 2: .* must hold numbers"),
     "empty id": (changed("tests.csv", "A-1", ""), "tests.csv: "),
     "input called test": (changed("measured.toml", "inputs.impact_angle", "inputs.test"), ""),
     "huge number": (changed("tests.csv", "A-1,30", "A-1,1" + "0" * 400), "tests.csv: "),

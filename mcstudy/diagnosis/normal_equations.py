@@ -1,0 +1,85 @@
+"""Normal equations of a fit: block-arrow, each test's own nuisances eliminated."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Scores of the shared values (p,) and of each test's nuisances (q,)."""
+
+    shared: Array
+    own: tuple[Array, ...]
+
+
+@dataclass(frozen=True)
+class Step:
+    """A move of all scores, and the log units by which the linear model gains there."""
+
+    move: Scores
+    expected_gain: float
+
+
+class NormalEquations:
+    """The equations at some slopes; residuals come later, so that many share the work.
+
+    Parameters
+    ----------
+    own, shared : slopes (n, q) and (n, p), whitened, a test.
+    weight : of the data against the priors.
+
+    Attributes
+    ----------
+    schur : (p, p), inverse covariance of the shared scores.
+    log_determinant : of the inverse covariance of all scores.
+    """
+
+    def __init__(self, own: Sequence[Array], shared: Sequence[Array], weight: float = 1.0) -> None:
+        self._weight = weight
+        self._own, self._shared = tuple(own), tuple(shared)
+        p = shared[0].shape[1]
+        self.schur: Array = np.eye(p)
+        self.log_determinant = 0.0
+        self._inverses: list[Array] = []
+        self._crosses: list[Array] = []
+        for a, b in zip(own, shared, strict=True):
+            block = np.eye(a.shape[1]) + weight**2 * (a.T @ a)
+            cross = weight**2 * (a.T @ b)
+            inverse = np.asarray(np.linalg.inv(block))
+            self.schur += weight**2 * (b.T @ b) - cross.T @ inverse @ cross
+            self.log_determinant += float(np.linalg.slogdet(block)[1])
+            self._inverses.append(inverse)
+            self._crosses.append(cross)
+        if p:
+            self.log_determinant += float(np.linalg.slogdet(self.schur)[1])
+
+    def solve(self, residuals: Sequence[Array], scores: Scores) -> Step:
+        """Return the move to the most probable scores of the linear model.
+
+        Parameters
+        ----------
+        residuals : (n,) whitened, a test. scores : at which they are.
+        """
+        right = -scores.shared.copy()
+        gain = 0.0
+        first = []
+        for r, a, b, z, inverse, cross in zip(
+            residuals, self._own, self._shared, scores.own, self._inverses, self._crosses,
+            strict=True,
+        ):  # fmt: skip
+            pull = self._weight**2 * (a.T @ r) - z
+            solved = inverse @ pull
+            right += self._weight**2 * (b.T @ r) - cross.T @ solved
+            gain += float(pull @ solved)
+            first.append(solved)
+        shared = np.asarray(np.linalg.solve(self.schur, right)) if right.size else right
+        own = tuple(
+            solved - inverse @ (cross @ shared)
+            for solved, inverse, cross in zip(first, self._inverses, self._crosses, strict=True)
+        )
+        return Step(Scores(shared, own), 0.5 * (gain + float(right @ shared)))

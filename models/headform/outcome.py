@@ -1,0 +1,117 @@
+"""Outputs and histories of a headform test."""
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.criteria import clip_level, head_injury_criterion
+from models.headform.impact import (
+    END_SLIDE,
+    END_SPIN,
+    END_TIME,
+    NORMAL,
+    PENETRATION,
+    RATE,
+    REBOUND,
+    SLIDE,
+    SPENT,
+    SPIN,
+    Impactor,
+)
+from models.protocol import History, history_of
+
+Array = NDArray[np.float64]
+
+SAMPLING_RATE = 20_000.0
+"""Hz of the accelerometer (SAE J211 asks for ten times the channel frequency class)."""
+QUIET = 0.005
+"""s of flight kept before and after the contact, so that the filter has room."""
+
+
+@dataclass(frozen=True)
+class Test:
+    """One test: impactor, initial speeds, what the loop left behind and the accelerometer read."""
+
+    impactor: Impactor
+    speeds: tuple[float, float]
+    record: Array
+    acceleration: Array
+    summary: Array
+    dent: tuple[float, float]
+
+
+def measures(test: Test) -> dict[str, Callable[[], float]]:
+    """Return how each output is had from a test that ended, by name."""
+    acceleration = np.hypot(*test.acceleration.T)
+    time = np.arange(acceleration.size) / SAMPLING_RATE
+    record, summary = test.record, test.summary
+    energy = 0.5 * test.impactor.mass * (test.speeds[0] ** 2 + test.speeds[1] ** 2)
+    left = 0.5 * test.impactor.mass * (summary[REBOUND] ** 2 + summary[END_SLIDE] ** 2)
+    left += 0.5 * test.impactor.inertia * summary[END_SPIN] ** 2
+    return {
+        "hic15": lambda: head_injury_criterion(time, acceleration, 0.015)[0],
+        "hic36": lambda: head_injury_criterion(time, acceleration, 0.036)[0],
+        "clip_3ms": lambda: clip_level(time, acceleration),
+        "clip_3ms_consecutive": lambda: clip_level(time, acceleration, mode="consecutive"),
+        "peak_head_acceleration": lambda: float(acceleration.max()),
+        "peak_force": lambda: float(record[:, NORMAL].max()),
+        "hood_intrusion": lambda: test.dent[0],
+        "permanent_dent": lambda: test.dent[1],
+        "rebound_speed": lambda: float(summary[REBOUND]),
+        "contact_duration": lambda: float(summary[END_TIME]),
+        "head_angular_velocity": lambda: float(np.abs(record[:, SPIN]).max()),
+        "energy_residual": lambda: float((energy - summary[SPENT] - left) / energy),
+    }
+
+
+def histories(test: Test, wanted: Collection[str] | None) -> dict[str, History]:
+    """Return the histories of headform and hood, or those wanted; time 0 is first contact."""
+    quiet = round(QUIET * SAMPLING_RATE)
+    record, last = test.record, test.record[-1]
+    before = np.arange(-quiet, 0) / SAMPLING_RATE
+    after = np.arange(1, quiet + 1) / SAMPLING_RATE
+    rate, slide = test.speeds
+
+    def padded(column: int, first: Array | float, end: Array | float) -> Array:
+        longer = np.empty(record.shape[0] + 2 * quiet)
+        longer[:quiet] = first
+        longer[quiet:-quiet] = record[:, column]
+        longer[-quiet:] = end
+        return longer
+
+    sources: dict[str, dict[str, tuple[str, Callable[[], Array]]]] = {
+        "head": {
+            "acceleration": ("g", lambda: _resultant(test.acceleration)),
+            "acceleration_normal": ("g", lambda: test.acceleration[:, 0]),
+            "acceleration_tangential": ("g", lambda: test.acceleration[:, 1]),
+            "velocity_normal": ("m/s", lambda: padded(RATE, rate, last[RATE])),
+            "velocity_tangential": ("m/s", lambda: padded(SLIDE, slide, last[SLIDE])),
+            "angular_velocity": ("rad/s", lambda: padded(SPIN, 0.0, last[SPIN])),
+        },
+        "hood": {
+            "force": ("N", lambda: padded(NORMAL, 0.0, 0.0)),
+            "penetration": (
+                "m",
+                lambda: padded(PENETRATION, before * rate, last[PENETRATION] + after * last[RATE]),
+            ),
+        },
+    }
+    time = np.arange(-quiet, record.shape[0] + quiet) / SAMPLING_RATE
+    found = {}
+    for group, channels in sources.items():
+        chosen = {
+            name: (source(), unit)
+            for name, (unit, source) in channels.items()
+            if wanted is None or f"{group}_{name}" in wanted
+        }
+        if chosen:
+            found[group] = history_of(time, chosen)
+    return found
+
+
+def _resultant(acceleration: Array) -> Array:
+    """Return the resultant of (n, 2); with nothing along the hood it keeps the normal's sign."""
+    normal, tangential = acceleration.T
+    return np.asarray(np.hypot(normal, tangential) if np.any(tangential) else normal.copy())

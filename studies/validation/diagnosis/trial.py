@@ -153,4 +153,9 @@ def _difference(layout: Layout, row: int, twin: Problem, fitted: Fit) -> Array:
         parts.append(change / signal.sd)
     for scalar, other_scalar in zip(layout.test.scalars, twin.tests[row].scalars, strict=True):
         parts.append(np.array([(other_scalar.value - scalar.value) / scalar.sd]))
-    return np.concatenate(parts)
+    change = np.concatenate(parts)
+    # A wrong record shifts what is expected, not what is measured.
+    for k, (name, sd) in enumerate(layout.test.doubtful.items()):
+        shift = twin.tests[row].inputs[name] - layout.test.inputs[name]
+        change -= fitted.own_slopes[row][:, k] * shift / sd
+    return change

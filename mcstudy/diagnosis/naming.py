@@ -85,6 +85,14 @@ def settle(problem: Problem, layouts: Sequence[Layout], fitted: Fit) -> Fit:
     return fitted
 
 
+def calmed(problem: Problem, layouts: Sequence[Layout], fitted: Fit, scatter: Scatter) -> Fit:
+    """Return a fit with another repeatability: what a misfit was taken for is none of it."""
+    if scatter == fitted.scatter:
+        return fitted
+    start = rescale(layouts, fitted, scatter)
+    return fit(problem, layouts, fitted.forms, start, scatter, fitted.slopes, exact=False)
+
+
 def rescale(layouts: Sequence[Layout], fitted: Fit, scatter: Scatter) -> Scores:
     """Return a fit's scores for another repeatability, the pulses unchanged as far as plausible."""
     own = []

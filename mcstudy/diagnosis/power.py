@@ -25,7 +25,7 @@ from mcstudy.diagnosis.templates import Template, change_of
 
 Array = NDArray[np.float64]
 
-SIZES = np.array([-2.5, -1.7, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0, 1.7, 2.5])
+SIZES = np.array([-4.0, -2.5, -1.7, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0, 1.7, 2.5, 4.0])
 """Scores of a cause's size at which its visibility is computed."""
 
 

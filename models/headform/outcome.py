@@ -83,7 +83,7 @@ def histories(test: Test, wanted: Collection[str] | None) -> dict[str, History]:
 
     sources: dict[str, dict[str, tuple[str, Callable[[], Array]]]] = {
         "head": {
-            "acceleration": ("g", lambda: _resultant(test.acceleration)),
+            "acceleration": ("g", lambda: np.hypot(*test.acceleration.T)),
             "acceleration_normal": ("g", lambda: test.acceleration[:, 0]),
             "acceleration_tangential": ("g", lambda: test.acceleration[:, 1]),
             "velocity_normal": ("m/s", lambda: padded(RATE, rate, last[RATE])),
@@ -109,9 +109,3 @@ def histories(test: Test, wanted: Collection[str] | None) -> dict[str, History]:
         if chosen:
             found[group] = history_of(time, chosen)
     return found
-
-
-def _resultant(acceleration: Array) -> Array:
-    """Return the resultant of (n, 2); with nothing along the hood it keeps the normal's sign."""
-    normal, tangential = acceleration.T
-    return np.asarray(np.hypot(normal, tangential) if np.any(tangential) else normal.copy())

@@ -66,6 +66,14 @@ class Simulation:
             self._models[key] = load_model(self.name, self._options, chosen)
         return self._models[key]
 
+    def _seen_as(self, name: str, inputs: Mapping[str, float]) -> str:
+        """Return the model's channel for a measured one.
+
+        In a straight impact one axis is measured, with its sign: an offset may be negative.
+        """
+        straight = self.name == "headform" and inputs.get("impact_angle", 0.0) == 0.0
+        return "head_acceleration_normal" if straight and name == "head_acceleration" else name
+
     def widened(self, filters: Mapping[str, float], scalars: Collection[str]) -> "Simulation":
         """Return the simulation with more channels and scalars."""
         return Simulation(
@@ -84,12 +92,13 @@ class Simulation:
         values = dict(inputs)
         for cause, parameters in effects.items():
             values |= {f"{cause}_{name}": value for name, value in parameters.items()}
-        run = model.observe(values, self._filters, self._scalars)
+        seen = {self._seen_as(name, values) for name in self._filters}
+        run = model.observe(values, seen, self._scalars)
         if run.status not in complete_status(model):
             return None
         signals = {}
         for name, channel_class in self._filters.items():
-            group, _, channel = name.partition("_")
+            group, _, channel = self._seen_as(name, run.inputs).partition("_")
             history = run.histories[group]
             signal = history.channels[channel]
             if channel_class > 0.0 and name not in FILTERED[self.name]:

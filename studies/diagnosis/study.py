@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcstudy.diagnosis.gain import Gain, Quantity, measure_gain
-from mcstudy.diagnosis.naming import Candidate
+from mcstudy.diagnosis.naming import Candidate, calmed
 from mcstudy.diagnosis.power import smallest_visible, worth_of
 from mcstudy.diagnosis.problem import Cause, Problem
 from mcstudy.diagnosis.regions import locate_misfit
@@ -111,8 +111,9 @@ def _write(
     """Write the folder of a finding and return the answer."""
     layouts = finding.layouts
     where = locate_misfit(finding.base, layouts)
-    visible = smallest_visible(problem, layouts, finding.base, causes, finding.screening.threshold)
     believed = finding.best or finding.base
+    calm = calmed(problem, layouts, finding.base, believed.scatter)
+    visible = smallest_visible(problem, layouts, calm, causes, finding.screening.threshold)
     near = [c for c in finding.candidates[1:] if c.cause.name in finding.ambiguous][:RIVALS]
     worth = worth_of(
         problem, layouts, believed, [c.fitted for c in near], causes, extras_of(problem, simulation)

@@ -19,7 +19,7 @@ QUIET = Laboratory(tests=3, noise_sd=0.0, scatter=0.0, speed_sd=0.0, scale_sd=0.
 
 
 def test_generator_and_model_agree_where_nothing_is_hidden(tmp_path: Path) -> None:
-    make_tests(tmp_path / "m", [], 1, QUIET)
+    make_tests(tmp_path / "m", [], 1, QUIET, header_of=Laboratory())
     data = load_measured(tmp_path / "m")
     model = load_model("headform", {"hood_curve": [list(knot) for knot in CURVE]})
     for row, name in enumerate(data.tests["test"]):
@@ -27,7 +27,7 @@ def test_generator_and_model_agree_where_nothing_is_hidden(tmp_path: Path) -> No
         speed = float(data.tests["impact_speed"].iloc[row])
         run = model.run({"impact_speed": speed, "headform_mass": 2.5, "hood_unloading_ratio": 7.0})
         head = run.histories["head"]
-        ours = np.interp(time, head.time, head.channels["acceleration"])
+        ours = np.interp(time, head.time, head.channels["acceleration_normal"])
         inside = (time > 0.0) & (time < head.time[-1])
         assert np.abs(ours - measured)[inside].max() < 2e-3 * measured.max()
 
@@ -45,7 +45,7 @@ def test_generator_and_model_agree_where_nothing_is_hidden(tmp_path: Path) -> No
 def test_generator_and_model_agree_on_effects(
     tmp_path: Path, name: str, form: str, numbers: dict[str, float], model: dict[str, float]
 ) -> None:
-    make_tests(tmp_path / "m", [Hidden(name, form, numbers)], 1, QUIET)
+    make_tests(tmp_path / "m", [Hidden(name, form, numbers)], 1, QUIET, header_of=Laboratory())
     data = load_measured(tmp_path / "m")
     curve = [list(knot) for knot in CURVE]
     extended = load_model("headform", {"hood_curve": curve}, {name: model})
@@ -54,7 +54,7 @@ def test_generator_and_model_agree_on_effects(
     speed = float(data.tests["impact_speed"].iloc[0])
     run = extended.run({"impact_speed": speed, "headform_mass": 2.5, "hood_unloading_ratio": 7.0})
     head = run.histories["head"]
-    ours = np.interp(time, head.time, head.channels["acceleration"])
+    ours = np.interp(time, head.time, head.channels["acceleration_normal"])
     assert np.abs(ours - measured).max() < 0.02 * measured.max()
 
 
@@ -107,8 +107,9 @@ def test_an_effect_outside_the_catalogue_is_not_named(
 
 
 def test_nothing_hidden_nothing_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # An alarm may be false once in twenty; a name must not come of it.
     outcome = trial(tmp_path, [], 23, monkeypatch)
-    assert not outcome.detected
+    assert outcome.named == ()
     assert outcome.size == 0.0
 
 

@@ -158,7 +158,9 @@ def test_the_rate_raises_the_force_by_its_share(exponent: float) -> None:
 
 def test_a_dashpot_is_the_damping_of_the_base_law() -> None:
     dashpot = struck({"rate_dependent_hood": {"damping": 80.0, "share": 0.0}})
-    assert dashpot.outputs == pytest.approx(struck(hood_damping=80.0).outputs)
+    assert dashpot.outputs == pytest.approx(
+        struck(hood_damping=80.0, hood_damping_onset=0.002).outputs
+    )
 
 
 def test_a_soft_skin_softens_the_start_and_springs_back() -> None:

@@ -94,7 +94,7 @@ def test_every_cause_has_a_smallest_size_or_none(gain: Any) -> None:
     causes = {row["cause"] for row in answer["visible"]}
     assert {"sensor_gain", "hood_bottoming", "rate_dependent_hood", "mass_error"} <= causes
     gain_seen = next(row for row in answer["visible"] if row["cause"] == "sensor_gain")
-    assert 1.0 < gain_seen["value"] < 1.08
+    assert 1.0 < gain_seen["value"] < 1.12
 
 
 def test_an_extra_measurement_is_recommended(gain: Any) -> None:

@@ -201,7 +201,7 @@ BAD: dict[str, tuple[list[tuple[str, str]], str, list[str], str]] = {
     "mass beyond the model": ([("2.5", "25.0")], "", [], "test H01: input 'headform_mass' = 25"),
     "unit of a length": ([('unit = "m/s"', 'unit = "m"')], "", [], "inputs.impact_speed.unit"),
     "no such signal": ([("signals.head_acceleration", "signals.chest")], "", [],
-                       "has no signal 'head_acceleration'"),
+                       "none of the signals chest is a column"),
     "method": ([], "", ["--method", "mean"], "--method must be one of quantiles, components"),
     "few knots": ([], "", ["--knots", "1"], "--knots must lie within 2 and 8, given 1"),
     "many knots": ([], "", ["--knots", "9"], "--knots"),

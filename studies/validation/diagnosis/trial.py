@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcstudy.diagnosis.fit import Fit
-from mcstudy.diagnosis.layout import Layout
+from mcstudy.diagnosis.layout import Layout, Scatter
 from mcstudy.diagnosis.marginal import Marginal
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.diagnosis.screening import POWER
@@ -138,9 +138,10 @@ def _size(
     )  # fmt: skip
     layouts, fitted = fit_base(plain)
     columns = [_difference(layout, i, twin, fitted)[:, None] for i, layout in enumerate(layouts)]
-    # The repeatability of the real set, not that of its noise-free twin.
+    # The repeatability that the real set was made with, not that of its noise-free twin.
     marginal = Marginal(fitted, layouts, columns)
-    reduced = marginal.reduce(marginal.measured(), finding.base.scatter)
+    scatter = Scatter(laboratory.scatter, 0.5 * laboratory.scatter)
+    reduced = marginal.reduce(marginal.measured(), scatter)
     strength = float(np.sqrt(reduced.information[0, 0]))
     return strength / (finding.screening.threshold + POWER)
 

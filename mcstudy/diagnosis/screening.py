@@ -170,11 +170,6 @@ def screen(
     threshold = float(np.quantile(null[:, 0], 1.0 - cut)) if bank else np.inf
     bank_part, drift_part, smooth_part = parts[:3]
     info, score = measured.information, measured.score
-    drift_factors = [
-        float(log_bayes_factor(info[k : k + 1, k : k + 1], score[:, k : k + 1])[0])
-        for k in range(drift_part.start, drift_part.stop)
-    ]
-    best = int(np.argmax(drift_factors)) if drift_factors else -1
     names = ("cause", "drift", "smooth discrepancy", "fine discrepancy")
     return Screening(
         p_value=p_value,
@@ -185,9 +180,20 @@ def screen(
         information=np.diag(info)[bank_part],
         threshold=threshold,
         flip_p_value=_flip(fitted, bank, rng),
-        drift=(drift.names[best], drift_factors[best]) if best >= 0 else ("", 0.0),
+        drift=_best_drift(measured, drift_part, drift.names),
         discrepancy=discrepancy_evidence(info[smooth_part, smooth_part], score[:, smooth_part]),
     )
+
+
+def _best_drift(reduced: Reduced, part: slice, names: Sequence[str]) -> tuple[str, float]:
+    """Return the drift with the largest log Bayes factor, and that."""
+    found = [
+        (float(log_bayes_factor(reduced.information[k : k + 1, k : k + 1],
+                                reduced.score[:, k : k + 1])[0]), name)
+        for k, name in zip(range(part.start, part.stop), names, strict=True)
+    ]  # fmt: skip
+    evidence, name = max(found, key=lambda entry: entry[0], default=(0.0, ""))
+    return name, evidence
 
 
 def discrepancy_evidence(information: Array, score: Array) -> float:
@@ -219,16 +225,11 @@ def remaining(
         p_values.append(float(stats.chi2(max(rank, 1)).sf(value[0])))
         left = max(left, float(value[0]) - rank)
     part = slice(edges[1], edges[2])
-    factors = [
-        float(log_bayes_factor(info[k : k + 1, k : k + 1], score[:, k : k + 1])[0])
-        for k in range(drift_part.stop)
-    ]
-    best = int(np.argmax(factors)) if factors else -1
     return (
         min(1.0, 3.0 * min(p_values)),
         0.5 * left,
         discrepancy_evidence(info[part, part], score[:, part]),
-        (drift.names[best], factors[best]) if best >= 0 else ("", 0.0),
+        _best_drift(reduced, drift_part, drift.names),
     )
 
 

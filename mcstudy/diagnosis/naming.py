@@ -68,12 +68,11 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Remainder:
-    """What a fit leaves behind: p-value, share of the misfit explained, best drift, discrepancy."""
+    """What a fit leaves behind: p-value, share of the misfit explained, best drift."""
 
     p_value: float
     share: float
     drift: tuple[str, float]
-    discrepancy: float
 
 
 def settle(problem: Problem, layouts: Sequence[Layout], fitted: Fit) -> Fit:
@@ -175,7 +174,9 @@ def approach(
     """
     forms = (*forms, surveyed.form)
     best: Fit | None = None
-    for start in surveyed.starts:
+    for promised, start in zip(surveyed.misfits, surveyed.starts, strict=True):
+        if promised > WORSE * surveyed.misfits[0] + CLOSE:
+            break
         try:
             for stage in (surveyed.weight, np.sqrt(surveyed.weight)) if surveyed.far else ():
                 found = fit(
@@ -256,7 +257,7 @@ def rank_causes(
 def examine(problem: Problem, layouts: Sequence[Layout], base: Fit, extended: Fit) -> Remainder:
     """Return what an extended fit leaves behind, against what it explained."""
     names = shared_names(problem, extended.forms)
-    p_value, left, discrepancy, drift = remaining(
+    p_value, left, drift = remaining(
         extended,
         layouts,
         drifts(layouts, extended, names),
@@ -265,4 +266,4 @@ def examine(problem: Problem, layouts: Sequence[Layout], base: Fit, extended: Fi
     )
     gained = max(base.misfit - extended.misfit, 0.0)
     whole = gained + max(left, 0.0)
-    return Remainder(p_value, gained / whole if whole > 0.0 else 1.0, drift, discrepancy)
+    return Remainder(p_value, gained / whole if whole > 0.0 else 1.0, drift)

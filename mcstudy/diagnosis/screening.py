@@ -64,7 +64,6 @@ class Screening:
     threshold : standard errors from which a template's score is an alarm.
     flip_p_value : by flipping the signs of whole tests, which needs no covariance.
     drift : the drift with the largest log Bayes factor, and that.
-    discrepancy : log Bayes factor of a smooth discrepancy of the best size.
     """
 
     p_value: float
@@ -74,7 +73,6 @@ class Screening:
     threshold: float
     flip_p_value: float
     drift: tuple[str, float]
-    discrepancy: float
 
 
 def _errors(marginal: Marginal, information: Array) -> Array:
@@ -168,20 +166,18 @@ def screen(
     p_value = float((1 + np.sum(smallest <= min(own))) / (smallest.size + 1))
     cut = float(np.quantile(smallest, LEVEL))
     threshold = float(np.quantile(null[:, 0], 1.0 - cut)) if bank else np.inf
-    bank_part, drift_part, smooth_part = parts[:3]
-    info, score = measured.information, measured.score
+    bank_part, drift_part = parts[:2]
     names = ("cause", "drift", "smooth discrepancy", "fine discrepancy")
     return Screening(
         p_value=p_value,
         statistics=tuple(
             Statistic(name, float(found[k]), float(own[k])) for k, name in enumerate(names)
         ),
-        scores=score[0, bank_part] / errors[bank_part],
-        information=np.diag(info)[bank_part],
+        scores=measured.score[0, bank_part] / errors[bank_part],
+        information=np.diag(measured.information)[bank_part],
         threshold=threshold,
         flip_p_value=_flip(fitted, bank, rng),
         drift=_best_drift(measured, drift_part, drift.names),
-        discrepancy=discrepancy_evidence(info[smooth_part, smooth_part], score[:, smooth_part]),
     )
 
 
@@ -196,16 +192,10 @@ def _best_drift(reduced: Reduced, part: slice, names: Sequence[str]) -> tuple[st
     return name, evidence
 
 
-def discrepancy_evidence(information: Array, score: Array) -> float:
-    """Return the log Bayes factor of a discrepancy whose size is the best of a few."""
-    sizes = (0.1, 0.3, 1.0, 3.0)
-    return max(float(log_bayes_factor(information, score, size)[0]) for size in sizes)
-
-
 def remaining(
     fitted: Fit, layouts: Sequence[Layout], drift: Shapes, smooth: Shapes, fine: Shapes
-) -> tuple[float, float, float, tuple[str, float]]:
-    """Return what a fit leaves: p-value, explained misfit, discrepancy's log Bayes factor, drift.
+) -> tuple[float, float, tuple[str, float]]:
+    """Return what a fit leaves: p-value, misfit that a discrepancy would explain, best drift.
 
     The p-value is the smallest of three by chi-square, times three.
     """
@@ -224,13 +214,8 @@ def remaining(
         value, rank = quadratic_form(info[part, part], score[:, part])
         p_values.append(float(stats.chi2(max(rank, 1)).sf(value[0])))
         left = max(left, float(value[0]) - rank)
-    part = slice(edges[1], edges[2])
-    return (
-        min(1.0, 3.0 * min(p_values)),
-        0.5 * left,
-        discrepancy_evidence(info[part, part], score[:, part]),
-        _best_drift(reduced, drift_part, drift.names),
-    )
+    best = _best_drift(reduced, drift_part, drift.names)
+    return min(1.0, 3.0 * min(p_values)), 0.5 * left, best
 
 
 def _tables(

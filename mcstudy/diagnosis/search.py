@@ -20,7 +20,7 @@ from mcstudy.diagnosis.naming import (
     settle,
 )
 from mcstudy.diagnosis.problem import Cause, Problem
-from mcstudy.diagnosis.screening import LEVEL, Screening, estimate_scatter, screen
+from mcstudy.diagnosis.screening import LEVEL, Screening, estimate_scatter, score_templates, screen
 from mcstudy.diagnosis.templates import (
     Template,
     all_forms,
@@ -40,6 +40,10 @@ SECOND_SHARE = 0.02
 best form of it leaves a little."""
 ALMOST_ALL = 0.98
 """Share of the explained misfit from which no second cause is looked for."""
+NOTABLE = 0.1
+"""Share of the first cause's evidence that a second one must add where they leave structure."""
+FURTHER = 4.5
+"""Standard errors from which a cause's template, after the first cause, is a second one's trace."""
 RIVAL = 0.5
 """Share of the best cause's evidence from which another one is tried as the first of two."""
 PAIRS = 2
@@ -61,6 +65,7 @@ class Finding:
     cause : name, ``unexplained``, or None if adequate. ambiguous : names within reach of the best.
     second : the second cause with its remainder, or None.
     best : the fit to extend the model with, or None.
+    flagged : whether the causes that are named leave structure behind.
     why : why the answer is what it is.
     """
 
@@ -75,6 +80,7 @@ class Finding:
     second: Candidate | None
     second_ambiguous: tuple[str, ...]
     best: Fit | None
+    flagged: bool
     why: str
 
     @property
@@ -129,7 +135,7 @@ def search(
         rng,
     )
     empty = Finding(
-        layouts, base, bank, screening, (), None, None, (), None, (), None,
+        layouts, base, bank, screening, (), None, None, (), None, (), None, False,
         "the model explains the data within what is uncertain",
     )  # fmt: skip
     if screening.p_value > LEVEL:
@@ -163,13 +169,17 @@ def _judge(
         best=best.fitted,
         why="one cause explains the misfit",
     )
-    if left.p_value >= STRUCTURE:
+    clean = left.p_value >= STRUCTURE
+    flagged = replace(
+        alone, flagged=True, why="one cause explains most of the misfit; something remains"
+    )
+    if clean and not _trace(problem, causes, empty.layouts, best.fitted):
         return alone
-    flagged = replace(alone, why="one cause explains most of the misfit; something remains")
-    if left.share >= ALMOST_ALL:
+    if not clean and left.share >= ALMOST_ALL:
         return flagged
     pair = _best_pair(problem, causes, empty, candidates, workers)
     if pair is not None:
+        explained = pair.remainder.p_value >= STRUCTURE
         return replace(
             alone,
             cause=pair.first.cause.name,
@@ -178,11 +188,26 @@ def _judge(
             second=pair.seconds[0],
             second_ambiguous=_near(pair.seconds),
             best=pair.seconds[0].fitted,
-            why="two causes explain the misfit together",
+            flagged=not explained,
+            why="two causes explain the misfit together"
+            if explained
+            else "two causes explain most of the misfit; something remains",
         )
+    if clean:
+        return alone
     if left.share >= MOST_OF_IT:
         return flagged
     return replace(nothing, remainder=left, why="the best cause leaves structure behind")
+
+
+def _trace(
+    problem: Problem, causes: Sequence[Cause], layouts: Sequence[Layout], fitted: Fit
+) -> bool:
+    """Return whether a further cause leaves a trace that is too faint for a general test."""
+    bank = cause_templates(problem, layouts, fitted, all_forms(causes))
+    score, information = score_templates(fitted, layouts, bank)
+    seen = information > 0.0
+    return bool(np.any(np.abs(score[seen]) > FURTHER * np.sqrt(information[seen])))
 
 
 def _near(candidates: Sequence[Candidate]) -> tuple[str, ...]:
@@ -226,7 +251,8 @@ def _best_pair(
         best = _Pair(first, seconds, left)
     if best is None:
         return None
-    least = max(SECOND, SECOND_SHARE * best.first.log_evidence)
-    if best.seconds[0].log_evidence < least:
-        return None
-    return best if best.remainder.p_value >= STRUCTURE else None
+    added, first = best.seconds[0].log_evidence, best.first.log_evidence
+    if best.remainder.p_value >= STRUCTURE:
+        return best if added >= max(SECOND, SECOND_SHARE * first) else None
+    most = best.remainder.share >= ALMOST_ALL and added >= NOTABLE * first
+    return best if most else None

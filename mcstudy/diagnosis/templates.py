@@ -28,6 +28,7 @@ PULSE_DRIFT = 0.02
 ONE_PARAMETER = (-2.0, -1.0, -0.3, 0.3, 1.0, 2.0)
 MORE_PARAMETERS = (-2.0, -1.0, 0.0, 1.0, 2.0)
 FINE = tuple(np.linspace(-2.5, 2.5, 17))
+BESIDE_FINE = (-1.5, 0.0, 1.5)
 """Scores of a cause's parameters at which it is tried."""
 STANDARD_GRID = 3
 """Free parameters beyond which the further ones stay at their median."""
@@ -61,7 +62,8 @@ def score_grid(form: Form, *, fine: bool = False) -> list[Array]:
     first: Sequence[float] = FINE if fine else MORE_PARAMETERS
     if count == 1:
         return [np.array([z]) for z in (FINE if fine else ONE_PARAMETER)]
-    axes = [first] + [MORE_PARAMETERS] * (min(count, STANDARD_GRID) - 1)
+    others: Sequence[float] = BESIDE_FINE if fine else MORE_PARAMETERS
+    axes = [first] + [others] * (min(count, STANDARD_GRID) - 1)
     axes += [(0.0,)] * (count - STANDARD_GRID)
     return [np.array(z) for z in np.stack(np.meshgrid(*axes), -1).reshape(-1, count)]
 

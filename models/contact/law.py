@@ -10,6 +10,7 @@ elastic recoveries. Both stay piecewise linear, so the combined law is exact (th
 "combined" contact characteristic, in closed form).
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,34 @@ DAMPING_ONSET = 0.005
 PENETRATION, FORCE, RECOVERY, SURFACE = 0, 1, 2, 3
 
 
+@kernel
+def _all_finite(penetration, force):
+    finite = True
+    for k in range(penetration.size):
+        finite &= math.isfinite(penetration[k]) and math.isfinite(force[k])
+    return finite
+
+
+@kernel
+def _rises(penetration, force):
+    """Return whether a curve begins at (0, 0) and rises strictly in both columns."""
+    rising = penetration[0] == 0.0 and force[0] == 0.0
+    for k in range(1, penetration.size):
+        rising &= penetration[k] > penetration[k - 1] and force[k] > force[k - 1]
+    return rising
+
+
+@kernel
+def stiffest_slope(penetration, force, unloading_ratio):
+    """Return the largest slope (N/m) of a curve, loading or unloading from any penetration."""
+    steepest, last = 0.0, 0.0
+    for k in range(1, penetration.size):
+        last = (force[k] - force[k - 1]) / (penetration[k] - penetration[k - 1])
+        steepest = max(steepest, last, unloading_ratio * force[k] / penetration[k])
+    # Beyond the last knot the secant tends to the last slope.
+    return max(steepest, unloading_ratio * last)
+
+
 @dataclass(frozen=True)
 class ForceCurve:
     """One side of a contact.
@@ -48,11 +77,11 @@ class ForceCurve:
 
     def __post_init__(self) -> None:
         d, f = self.penetration, self.force
-        if not (np.isfinite(d).all() and np.isfinite(f).all()):
-            raise ValueError("the knots of a force curve must be finite")
         if d.ndim != 1 or d.shape != f.shape or not 2 <= d.size <= KNOTS // 2:
             raise ValueError(f"a force curve takes 2 to {KNOTS // 2} knots, given {d.shape}")
-        if d[0] != 0.0 or f[0] != 0.0 or not ((d[1:] > d[:-1]).all() and (f[1:] > f[:-1]).all()):
+        if not _all_finite(d, f):
+            raise ValueError("the knots of a force curve must be finite")
+        if not _rises(d, f):
             raise ValueError("a force curve starts at (0, 0) and rises strictly in both columns")
         if not (self.unloading_ratio > 1.0 and self.damping >= 0.0):
             raise ValueError("unloading_ratio must exceed 1 and damping must not be negative")

@@ -6,7 +6,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from models.compilation import kernel
+from models.compilation import inlined_kernel, kernel
 
 Array = NDArray[np.float64]
 
@@ -29,19 +29,48 @@ def _sections(frequency_class: float, sampling_rate: float) -> Array:
     return np.array([gain, 2.0 * gain, gain, a1, a2])
 
 
-@kernel
-def _pass(section, values):
-    """Filter values in place, from the state that a constant of the first value would leave."""
+@inlined_kernel
+def _pass(section, values, start, step):
+    """Filter values in place, from the state that a constant of the first value would leave.
+
+    ``start`` is the first sample that is taken, ``step`` 1 or -1 the direction.
+    """
     b0, b1, b2, a1, a2 = section[0], section[1], section[2], section[3], section[4]
     # The gain at frequency zero is one, so a constant goes through unchanged.
-    first = (1.0 - b0) * values[0]
-    second = (b2 - a2) * values[0]
-    for k in range(values.shape[0]):
+    first = (1.0 - b0) * values[start]
+    second = (b2 - a2) * values[start]
+    k = start
+    for _ in range(values.shape[0]):
         x = values[k]
         y = b0 * x + first
         first = b1 * x - a1 * y + second
         second = b2 * x - a2 * y
         values[k] = y
+        k += step
+
+
+@kernel
+def _there_and_back(section, signal, longer, filtered):
+    """Filter the columns of a signal (n, k) into ``filtered``; ``longer`` is room for one."""
+    n = signal.shape[0]
+    pad = (longer.size - n) // 2
+    for column in range(signal.shape[1]):
+        x = signal[:, column]
+        nothing = True
+        for k in range(n):
+            longer[pad + k] = x[k]
+            nothing &= x[k] == 0.0
+        # Nothing stays nothing: the second axis of a straight impact is not filtered.
+        if nothing:
+            filtered[:, column] = 0.0
+            continue
+        for k in range(pad):
+            longer[k] = 2.0 * x[0] - x[pad - k]
+            longer[pad + n + k] = 2.0 * x[n - 1] - x[n - 2 - k]
+        _pass(section, longer, 0, 1)
+        _pass(section, longer, longer.size - 1, -1)
+        for k in range(n):
+            filtered[k, column] = longer[pad + k]
 
 
 def filter_cfc(signal: ArrayLike, sampling_rate: float, frequency_class: float = 1000.0) -> Array:
@@ -71,23 +100,8 @@ def filter_cfc(signal: ArrayLike, sampling_rate: float, frequency_class: float =
         )
     x = np.asarray(signal, dtype=np.float64)
     section = _sections(float(frequency_class), float(sampling_rate))
-    # Nothing stays nothing: the second axis of a straight impact is not filtered.
-    columns = [
-        _there_and_back(section, column) if np.any(column) else column
-        for column in x.reshape(x.shape[0], -1).T
-    ]
-    return np.stack(columns, axis=1).reshape(x.shape)
-
-
-def _there_and_back(section: Array, x: Array) -> Array:
-    n, pad = x.size, min(x.size - 1, PADDING)
-    longer = np.empty(n + 2 * pad)
-    longer[pad : pad + n] = x
-    longer[:pad] = 2.0 * x[0] - x[pad:0:-1]
-    longer[pad + n :] = (
-        2.0 * x[-1] - x[n - 2 : n - 2 - pad : -1] if pad < n - 1 else (2.0 * x[-1] - x[n - 2 :: -1])
-    )
-    _pass(section, longer)
-    backwards = longer[::-1].copy()
-    _pass(section, backwards)
-    return backwards[::-1][pad : pad + n].copy()
+    columns = x.reshape(x.shape[0], -1)
+    filtered = np.empty_like(columns)
+    longer = np.empty(x.shape[0] + 2 * min(x.shape[0] - 1, PADDING))
+    _there_and_back(section, columns, longer, filtered)
+    return filtered.reshape(x.shape)

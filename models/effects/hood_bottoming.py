@@ -28,7 +28,7 @@ def apply(curve: ForceCurve, parameters: Mapping[str, float]) -> ForceCurve:
     depths = np.array([0.0, *(DEPTHS if power > 1.0 else DEPTHS[-1:])])
     added_knots = clearance + depths
     apart = np.abs(added_knots[:, None] - curve.penetration).min(axis=1) > NEAREST
-    x = np.union1d(curve.penetration, added_knots[apart])
+    x = np.sort(np.concatenate([curve.penetration, added_knots[apart]]))
     depth = np.maximum(x - clearance, 0.0)
     added = parameters["stiffness"] * depth * (depth / REFERENCE) ** (power - 1.0)
     return replace(curve, penetration=x, force=curve.at(x) + added)

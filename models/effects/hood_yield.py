@@ -14,7 +14,7 @@ def apply(curve: ForceCurve, parameters: Mapping[str, float]) -> ForceCurve:
     d, f = curve.penetration, curve.force
     last = (f[-1] - f[-2]) / (d[-1] - d[-2])
     begin = float(np.interp(force, f, d)) if force <= f[-1] else d[-1] + (force - f[-1]) / last
-    x = np.union1d(d, [begin])
+    x = d if begin in d else np.sort(np.append(d, begin))
     if begin >= x[-1]:
         # The last slope goes on beyond the last knot: one more there tells it what is left.
         x = np.append(x, begin + d[-1])

@@ -18,6 +18,7 @@ from models.contact.law import (
     combine_curves,
     interpolate_law,
     law_of,
+    stiffest_slope,
 )
 from models.criteria.units import STANDARD_GRAVITY
 from models.declaration import read_inputs, read_outputs, run_rows
@@ -273,10 +274,7 @@ class HeadformModel:
             )  # fmt: skip
         mass, radius = values["headform_mass"], 0.5 * values["headform_diameter"]
         impactor = Impactor(mass, self._gyration * mass * radius**2, radius)
-        # The stiffest the contact gets: unloading from a knot, or from beyond the last one.
-        secant = curve.force[1:] / curve.penetration[1:]
-        slope = np.diff(curve.force) / np.diff(curve.penetration)
-        stiffest = max(curve.unloading_ratio * max(secant.max(), slope[-1]), slope.max())
+        stiffest = stiffest_slope(curve.penetration, curve.force, curve.unloading_ratio)
         frequency = math.sqrt(stiffest / mass) + DAMPING_WEIGHT * contact.damping / mass
         stride = math.ceil(frequency / (PHASE * SAMPLING_RATE))
         stride = min(max(stride, FINEST), MOST_STEPS)

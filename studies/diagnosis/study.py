@@ -141,6 +141,7 @@ def _write(
         "ambiguous": list(finding.ambiguous),
         "second_cause": None if finding.second is None else finding.second.cause.name,
         "second_ambiguous": list(finding.second_ambiguous),
+        "flagged": finding.flagged,
         "why": finding.why,
         "remainder": None if finding.remainder is None else asdict(finding.remainder),
         "drift": {"name": finding.screening.drift[0], "log_evidence": finding.screening.drift[1]},

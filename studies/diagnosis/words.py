@@ -94,7 +94,7 @@ def answer(found: Mapping[str, Any]) -> list[str]:
     if found["second_ambiguous"]:
         names = [titles[n] for n in found["second_ambiguous"] if n != found["second_cause"]]
         lines.append(f"The second cause cannot be told from: {'; '.join(names)}.")
-    if "something remains" in found["why"]:
+    if found["flagged"]:
         lines.append("Something remains that this does not explain.")
     return lines
 

@@ -6,7 +6,6 @@ and is compared with its answer after it has ended.
 
 import tempfile
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -46,7 +45,7 @@ class Outcome:
     Attributes
     ----------
     trial : Trial. hidden : what was hidden, ``effect (form)``. names : of the effects.
-    size : of the whole effect over the smallest that is seen with 80 % power.
+    size : of the effect, the smaller one of two, alone over the smallest seen with 80 % power.
     p_value, cause, ambiguous, second, second_ambiguous : of the answer. why : in words.
     seconds : that the search took.
     """
@@ -91,18 +90,18 @@ def run_trial(trial: Trial, workers: int = 1) -> Outcome:
         start = time.perf_counter()
         finding = search(problem, causes_of("headform"), workers=workers)
         seconds = time.perf_counter() - start
-        size = _size(Path(scratch), hidden, trial.seed, laboratory, finding) if hidden else 0.0
+        sizes = [_size(Path(scratch) / h.name, h, trial.seed, laboratory, finding) for h in hidden]
     return Outcome(
         trial=trial,
         hidden=tuple(f"{h.name} ({h.form or 'one form'})" for h in hidden),
         names=tuple(h.name for h in hidden),
-        size=size,
+        size=min(sizes, default=0.0),
         p_value=finding.screening.p_value,
         cause=finding.cause,
         ambiguous=finding.ambiguous,
         second=None if finding.second is None else finding.second.cause.name,
         second_ambiguous=finding.second_ambiguous,
-        flagged="something remains" in finding.why,
+        flagged=finding.flagged,
         why=finding.why,
         seconds=seconds,
     )
@@ -115,7 +114,7 @@ def _problem(folder: Path) -> Problem:
 
 
 def _size(
-    scratch: Path, hidden: Sequence[Hidden], seed: int, laboratory: Laboratory, finding: Finding
+    scratch: Path, hidden: Hidden, seed: int, laboratory: Laboratory, finding: Finding
 ) -> float:
     """Return the size of an effect over the smallest that would be seen.
 
@@ -123,7 +122,7 @@ def _size(
     difference, all nuisances integrated out, in standard errors over those needed.
     """
     quiet = replace(laboratory, noise_sd=0.0, scatter=0.0, speed_sd=0.0)
-    for name, effects in (("with", hidden), ("without", ())):
+    for name, effects in (("with", [hidden]), ("without", [])):
         make_tests(scratch / name, effects, seed, quiet, header_of=laboratory)
     twin, plain = _problem(scratch / "with"), _problem(scratch / "without")
     plain = replace(

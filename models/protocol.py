@@ -4,7 +4,7 @@ A model never raises for a row of inputs inside its ranges: a run that fails is 
 other than ``ok`` and NaN where an output has no value. A row of a batch depends on that row alone.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -70,6 +70,29 @@ def history_of(time: Array, channels: Mapping[str, tuple[Array, str]]) -> Histor
         {name: values for name, (values, _) in channels.items()},
         {name: unit for name, (_, unit) in channels.items()},
     )
+
+
+def chosen_histories(
+    time: Array,
+    sources: Mapping[str, Mapping[str, tuple[str, Callable[[], Array]]]],
+    wanted: Collection[str] | None,
+) -> dict[str, History]:
+    """Return histories by group, only the channels ``<group>_<channel>`` that are wanted if given.
+
+    Parameters
+    ----------
+    sources : unit of each channel and how it is had, by group and name.
+    """
+    found = {}
+    for group, channels in sources.items():
+        chosen = {
+            name: (source(), unit)
+            for name, (unit, source) in channels.items()
+            if wanted is None or f"{group}_{name}" in wanted
+        }
+        if chosen:
+            found[group] = history_of(time, chosen)
+    return found
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,7 @@ FAR = 0.7
 FARTHEST_START = 3.0
 """Score beyond which no fit begins."""
 CLOSE, WORSE = 60.0, 1.4
-"""Log units and factor by which a form, or a second start, may promise less than the best."""
+"""Log units and factor by which a form may promise less than the best."""
 HOPELESS = 1.5
 """Factor on the best misfit beyond which a form is not fitted any further."""
 STAGE_STEPS = 6
@@ -174,9 +174,7 @@ def approach(
     """
     forms = (*forms, surveyed.form)
     best: Fit | None = None
-    for promised, start in zip(surveyed.misfits, surveyed.starts, strict=True):
-        if promised > WORSE * surveyed.misfits[0] + CLOSE:
-            break
+    for start in surveyed.starts:
         try:
             for stage in (surveyed.weight, np.sqrt(surveyed.weight)) if surveyed.far else ():
                 found = fit(

@@ -251,8 +251,8 @@ def _best_pair(
         best = _Pair(first, seconds, left)
     if best is None:
         return None
-    added, first = best.seconds[0].log_evidence, best.first.log_evidence
+    added, sole = best.seconds[0].log_evidence, best.first.log_evidence
     if best.remainder.p_value >= STRUCTURE:
-        return best if added >= max(SECOND, SECOND_SHARE * first) else None
-    most = best.remainder.share >= ALMOST_ALL and added >= NOTABLE * first
+        return best if added >= max(SECOND, SECOND_SHARE * sole) else None
+    most = best.remainder.share >= ALMOST_ALL and added >= NOTABLE * sole
     return best if most else None

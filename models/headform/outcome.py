@@ -20,7 +20,7 @@ from models.headform.impact import (
     SPIN,
     Impactor,
 )
-from models.protocol import History, history_of
+from models.protocol import History, chosen_histories
 
 Array = NDArray[np.float64]
 
@@ -99,13 +99,4 @@ def histories(test: Test, wanted: Collection[str] | None) -> dict[str, History]:
         },
     }
     time = np.arange(-quiet, record.shape[0] + quiet) / SAMPLING_RATE
-    found = {}
-    for group, channels in sources.items():
-        chosen = {
-            name: (source(), unit)
-            for name, (unit, source) in channels.items()
-            if wanted is None or f"{group}_{name}" in wanted
-        }
-        if chosen:
-            found[group] = history_of(time, chosen)
-    return found
+    return chosen_histories(time, sources, wanted)

@@ -29,7 +29,7 @@ from models.multibody.simulation import (
 from models.multibody.surfaces import CHANNELS, empty_contacts
 from models.multibody.tree import empty_loads
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK, is_possible
-from models.protocol import OK, Batch, Input, Output, Run, Scene, complete_inputs
+from models.protocol import OK, Batch, Input, Output, Run, complete_inputs
 from models.vehicle.profile import Vehicle, load_vehicle
 
 Array = NDArray[np.float64]
@@ -114,9 +114,7 @@ class MultibodyModel:
         ValueError
             If an input is unknown or outside its range.
         """
-        values = complete_inputs(self, inputs)
-        raw = self._simulate(values)
-        return self._run_of(values, raw, None if isinstance(raw, str) else outcome.scene(raw))
+        return self._run(complete_inputs(self, inputs), None, None, scene=True)
 
     def observe(
         self,
@@ -124,26 +122,38 @@ class MultibodyModel:
         channels: Collection[str],
         outputs: Collection[str] = (),
     ) -> Run:
-        """Run once for what a test records: no scene, but all channels and outputs.
+        """Run once for what a test records: only the channels and outputs that are named.
 
         Parameters
         ----------
-        inputs : by name. channels, outputs : that must be there; the others cost nothing more.
+        inputs : by name. channels : ``<group>_<channel>``, e.g. ``head_acceleration``.
+        outputs : by name.
 
         Raises
         ------
         ValueError
             If an input is unknown or outside its range.
         """
-        values = complete_inputs(self, inputs)
-        return self._run_of(values, self._simulate(values), None)
+        return self._run(complete_inputs(self, inputs), outputs, channels, scene=False)
 
-    def _run_of(self, values: dict[str, float], raw: outcome.Raw | str, scene: Scene | None) -> Run:
+    def _run(
+        self,
+        values: dict[str, float],
+        outputs: Collection[str] | None,
+        channels: Collection[str] | None,
+        *,
+        scene: bool,
+    ) -> Run:
+        raw = self._simulate(values)
         if isinstance(raw, str):
-            return Run(values, raw, raw, self._empty())
-        status, outputs = self._judge(raw)
+            return Run(values, raw, raw, self._empty(outputs))
+        signals = outcome.Signals(raw)
+        status, measured = self._judge(raw, signals, outputs)
         reason = END_REASONS[int(raw.summary[S_REASON])]
-        return Run(values, status, reason, outputs, outcome.histories(raw), scene)
+        histories = outcome.histories(raw, signals, channels)
+        return Run(
+            values, status, reason, measured, histories, outcome.scene(raw) if scene else None
+        )
 
     def run_batch(self, rows: Array) -> Batch:
         """Run rows of inputs.
@@ -157,23 +167,33 @@ class MultibodyModel:
         ValueError
             If the array has another number of columns or a value outside its range.
         """
-        return run_rows(self, rows, lambda values: self._judge(self._simulate(values)))
+        return run_rows(self, rows, self._row)
 
-    def _empty(self) -> dict[str, float]:
-        return dict.fromkeys((item.name for item in self.outputs), math.nan)
-
-    def _judge(self, raw: outcome.Raw | str) -> tuple[str, dict[str, float]]:
-        """Return the status of a run, or why it did not start, and its outputs."""
+    def _row(self, values: dict[str, float]) -> tuple[str, dict[str, float]]:
+        """Return status and outputs of one run."""
+        raw = self._simulate(values)
         if isinstance(raw, str):
             return raw, self._empty()
+        return self._judge(raw, outcome.Signals(raw))
+
+    def _empty(self, wanted: Collection[str] | None = None) -> dict[str, float]:
+        names = (item.name for item in self.outputs if wanted is None or item.name in wanted)
+        return dict.fromkeys(names, math.nan)
+
+    def _judge(
+        self, raw: outcome.Raw, signals: outcome.Signals, wanted: Collection[str] | None = None
+    ) -> tuple[str, dict[str, float]]:
+        """Return the status of a run and its outputs, or those that are wanted."""
+        outputs = self._empty(wanted)
         reason = END_REASONS[int(raw.summary[S_REASON])]
         if not reason.startswith("rest"):
-            return reason, self._empty()
-        outputs = self._empty() | outcome.measure(raw)
-        if math.isnan(outputs["head_impact_time"]):
+            return reason, outputs
+        measures = outcome.measures(raw, signals)
+        outputs |= {name: measures[name]() for name in outputs if name in measures}
+        if math.isnan(measures["head_impact_time"]()):
             return NO_HEAD_CONTACT, outputs
         if not all(math.isfinite(value) for value in outputs.values()):
-            return "not_finite", self._empty()
+            return "not_finite", self._empty(wanted)
         return OK, outputs
 
     def _simulate(self, values: dict[str, float]) -> outcome.Raw | str:

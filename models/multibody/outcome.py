@@ -1,7 +1,8 @@
 """Outputs, histories and pictures of a finished run."""
 
+import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,7 +40,7 @@ from models.multibody.simulation import (
 )
 from models.multibody.surfaces import WORK_CHANNELS
 from models.pedestrian.anthropometry import HEAD, SEGMENTS
-from models.protocol import History, Scene, history_of
+from models.protocol import History, Scene, chosen_histories, history_of
 from models.vehicle.motion import stopping_distance
 from models.vehicle.profile import (
     hood_edge_distance,
@@ -76,138 +77,172 @@ class Raw:
     summary: Array
 
 
-@dataclass(frozen=True)
-class _Signals:
-    """Head signals on the uniform grid, filtered; the primary phase ends at sample ``split``."""
+class Signals:
+    """Head signals of a run on the uniform grid, filtered; each is made when it is asked for.
 
-    time: Array
-    acceleration: Array  # g, resultant
-    spin: Array  # rad/s, own axes
-    spin_rate: Array  # rad/s2, own axes
-    split: int
+    Attributes
+    ----------
+    time : (n,) s. split : sample at which the primary phase ends.
+    """
 
+    def __init__(self, raw: Raw) -> None:
+        self._raw = raw
+        end = raw.record[-1, R_TIME]
+        self.time: Array = np.arange(int(end * SAMPLING_RATE) + 1) / SAMPLING_RATE
+        ground = raw.summary[S_GROUND_TIME]
+        split = self.time.size if math.isinf(ground) else int(np.searchsorted(self.time, ground))
+        self.split = max(split, min(SHORTEST_PHASE, self.time.size))
 
-def _signals(raw: Raw) -> _Signals:
-    record = raw.record
-    time = np.arange(int(record[-1, R_TIME] * SAMPLING_RATE) + 1) / SAMPLING_RATE
-
-    def sampled(first: int) -> Array:
+    def sampled(self, first: int, columns: int) -> Array:
+        """Return columns (n, columns) of the record on the grid."""
+        record = self._raw.record
         return np.stack(
-            [np.interp(time, record[:, R_TIME], record[:, first + k]) for k in range(3)], axis=1
+            [np.interp(self.time, record[:, R_TIME], record[:, first + k]) for k in range(columns)],
+            axis=1,
         )
 
-    felt = Reading(sampled(R_ACCELERATION) / STANDARD_GRAVITY, LINEAR_CLASS)
-    acceleration = record_reading(raw.chain, raw.values, felt, SAMPLING_RATE, origin=0)
-    ground = raw.summary[S_GROUND_TIME]
-    split = time.size if math.isinf(ground) else int(np.searchsorted(time, ground))
-    return _Signals(
-        time=time,
-        acceleration=np.linalg.norm(acceleration, axis=1),
-        spin=filter_cfc(sampled(R_SPIN), SAMPLING_RATE, ANGULAR_CLASS),
-        spin_rate=filter_cfc(sampled(R_SPIN_RATE), SAMPLING_RATE, ANGULAR_CLASS),
-        split=max(split, min(SHORTEST_PHASE, time.size)),
-    )
+    @functools.cached_property
+    def acceleration(self) -> Array:
+        """Resultant acceleration (n,) in g."""
+        raw = self._raw
+        felt = Reading(self.sampled(R_ACCELERATION, 3) / STANDARD_GRAVITY, LINEAR_CLASS)
+        read = record_reading(raw.chain, raw.values, felt, SAMPLING_RATE, origin=0)
+        return np.asarray(np.linalg.norm(read, axis=1))
+
+    @functools.cached_property
+    def spin(self) -> Array:
+        """Angular velocity (n, 3) in rad/s, own axes."""
+        return filter_cfc(self.sampled(R_SPIN, 3), SAMPLING_RATE, ANGULAR_CLASS)
+
+    @functools.cached_property
+    def spin_rate(self) -> Array:
+        """Angular acceleration (n, 3) in rad/s2, own axes."""
+        return filter_cfc(self.sampled(R_SPIN_RATE, 3), SAMPLING_RATE, ANGULAR_CLASS)
 
 
-def measure(raw: Raw) -> dict[str, float]:
-    """Return the outputs of a run that came to rest; NaN where one has no value."""
-    record = raw.record
-    signals = _signals(raw)
+def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
+    """Return how each output of a run that came to rest is had, by name."""
+    record, time = raw.record, signals.time
     car = slice(0, signals.split)
-    road = slice(signals.split, signals.time.size)
-    time, acceleration = signals.time, signals.acceleration
-    path = record[-1, R_CENTRE : R_CENTRE + 2] - record[0, R_CENTRE : R_CENTRE + 2]
-    spent = raw.work.sum()
-    gained = raw.summary[S_ENERGY_END] - raw.summary[S_ENERGY_START]
-    forward = np.diff(record[:, R_CENTRE]) / np.diff(record[:, R_TIME])
-    outputs = {
-        "hic15": head_injury_criterion(time[car], acceleration[car], 0.015)[0],
-        "hic36": head_injury_criterion(time[car], acceleration[car], 0.036)[0],
-        "clip_3ms": clip_level(time[car], acceleration[car]),
-        "clip_3ms_consecutive": clip_level(time[car], acceleration[car], mode="consecutive"),
-        "peak_head_acceleration": float(acceleration[car].max()),
-        "head_angular_velocity": float(np.linalg.norm(signals.spin[car], axis=1).max()),
-        "head_angular_acceleration": float(np.linalg.norm(signals.spin_rate[car], axis=1).max()),
-        "bric": brain_injury_criterion(signals.spin[car]),
-        "throw_distance": float(np.hypot(*path)),
-        "launch_speed": float(forward.max()),
-        "ground_hic15": 0.0,
-        "ground_time": float(raw.summary[S_TIME]),
-        "crash_duration": float(raw.summary[S_TIME]),
-        "car_stopping_distance": stopping_distance(raw.crash.car_motion),
-        "energy_residual": float((gained - spent) / np.abs(raw.work).max()),
+    road = slice(signals.split, time.size)
+    landed = time[road].size > SHORTEST_PHASE
+
+    def hic(phase: slice, window: float) -> float:
+        return head_injury_criterion(time[phase], signals.acceleration[phase], window)[0]
+
+    def clip(mode: str) -> float:
+        return clip_level(time[car], signals.acceleration[car], mode=mode)
+
+    def throw() -> float:
+        path = record[-1, R_CENTRE : R_CENTRE + 2] - record[0, R_CENTRE : R_CENTRE + 2]
+        return float(np.hypot(*path))
+
+    def energy_residual() -> float:
+        gained = raw.summary[S_ENERGY_END] - raw.summary[S_ENERGY_START]
+        return float((gained - raw.work.sum()) / np.abs(raw.work).max())
+
+    return {
+        "hic15": lambda: hic(car, 0.015),
+        "hic36": lambda: hic(car, 0.036),
+        "clip_3ms": lambda: clip("cumulative"),
+        "clip_3ms_consecutive": lambda: clip("consecutive"),
+        "peak_head_acceleration": lambda: float(signals.acceleration[car].max()),
+        "head_angular_velocity": lambda: float(np.linalg.norm(signals.spin[car], axis=1).max()),
+        "head_angular_acceleration": lambda: float(
+            np.linalg.norm(signals.spin_rate[car], axis=1).max()
+        ),
+        "bric": lambda: brain_injury_criterion(signals.spin[car]),
+        "throw_distance": throw,
+        "launch_speed": lambda: float(
+            (np.diff(record[:, R_CENTRE]) / np.diff(record[:, R_TIME])).max()
+        ),
+        "ground_hic15": lambda: hic(road, 0.015) if landed else 0.0,
+        "ground_time": lambda: float(raw.summary[S_GROUND_TIME if landed else S_TIME]),
+        "crash_duration": lambda: float(raw.summary[S_TIME]),
+        "car_stopping_distance": lambda: stopping_distance(raw.crash.car_motion),
+        "energy_residual": energy_residual,
+        **_head_contact(raw, signals),
     }
-    if time[road].size > SHORTEST_PHASE:
-        outputs["ground_hic15"] = head_injury_criterion(time[road], acceleration[road], 0.015)[0]
-        outputs["ground_time"] = float(raw.summary[S_GROUND_TIME])
-    return outputs | _head_contact(raw, signals)
 
 
-def _head_contact(raw: Raw, signals: _Signals) -> dict[str, float]:
-    """Return the outputs of the head's contact with the car, NaN if there was none."""
+def _head_contact(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
+    """Return how the outputs of the head's contact with the car are had, NaN if there was none."""
     contact = raw.head_contact
     zone = int(raw.summary[S_HEAD_ZONE])
     if not math.isfinite(contact[0]) or zone < 0:
-        return {"head_impact_time": math.nan}
+        return {"head_impact_time": lambda: math.nan}
     vehicle, laws = raw.crash.vehicle, raw.crash.ellipsoids
-    dive = raw.chain.act("inputs", raw.values, raw.values)["dive_angle"]
-    surface = surface_point(raw.crash.zones, zone, contact[[7, 9]])
-    wad = wrap_around_distance(vehicle.name, zone, static_point(vehicle, dive, surface))
     law = int(laws.surface_law[HEAD, zone])
-    force = np.interp(signals.time, raw.record[:, R_TIME], raw.record[:, R_HEAD_CAR])
-    car = slice(0, signals.split)
+
+    def wad() -> float:
+        dive = raw.chain.act("inputs", raw.values, raw.values)["dive_angle"]
+        surface = surface_point(raw.crash.zones, zone, contact[[7, 9]])
+        return wrap_around_distance(vehicle.name, zone, static_point(vehicle, dive, surface))
+
+    def mass() -> float:
+        car = slice(0, signals.split)
+        force = signals.sampled(R_HEAD_CAR, 1)[car, 0]
+        return effective_mass(signals.time[car], force, signals.acceleration[car])
+
+    def intrusion() -> float:
+        depth = raw.summary[S_HEAD_DEPTH]
+        return float(interpolate_law(laws.laws, law, laws.counts[law], SURFACE, depth))
+
     return {
-        "head_impact_time": float(contact[0]),
-        "head_impact_speed": float(np.linalg.norm(contact[1:4])),
-        "head_impact_angle": impact_angle(contact[1:4], contact[4:7]),
-        "effective_head_mass": effective_mass(
-            signals.time[car], force[car], signals.acceleration[car]
-        ),
+        "head_impact_time": lambda: float(contact[0]),
+        "head_impact_speed": lambda: float(np.linalg.norm(contact[1:4])),
+        "head_impact_angle": lambda: impact_angle(contact[1:4], contact[4:7]),
+        "effective_head_mass": mass,
         "wad": wad,
-        "head_dent_distance": wad - hood_edge_distance(vehicle.name),
-        "head_fender_distance": vehicle.hood_side - abs(float(contact[8])),
-        "hood_intrusion": float(
-            interpolate_law(laws.laws, law, laws.counts[law], SURFACE, raw.summary[S_HEAD_DEPTH])
-        ),
+        "head_dent_distance": lambda: wad() - hood_edge_distance(vehicle.name),
+        "head_fender_distance": lambda: vehicle.hood_side - abs(float(contact[8])),
+        "hood_intrusion": intrusion,
     }
 
 
-def histories(raw: Raw) -> dict[str, History]:
-    """Return head and contact histories on the uniform grid, and the energy balance's totals."""
-    signals = _signals(raw)
-    record, time = raw.record, signals.time
+def histories(
+    raw: Raw, signals: Signals, wanted: Collection[str] | None = None
+) -> dict[str, History]:
+    """Return head and contact histories on the uniform grid and the energy balance's totals.
 
-    def sampled(column: int) -> Array:
-        return np.interp(time, record[:, R_TIME], record[:, column])
+    Or only the channels ``<group>_<channel>`` that are wanted.
+    """
 
-    relative = np.stack([sampled(R_RELATIVE + k) for k in range(3)], axis=1)
-    head = {
-        "acceleration": (signals.acceleration, "g"),
-        "angular_velocity": (np.linalg.norm(signals.spin, axis=1), "rad/s"),
-        "angular_velocity_x": (signals.spin[:, 0], "rad/s"),
-        "angular_velocity_y": (signals.spin[:, 1], "rad/s"),
-        "angular_velocity_z": (signals.spin[:, 2], "rad/s"),
-        "angular_acceleration": (np.linalg.norm(signals.spin_rate, axis=1), "rad/s2"),
-        "velocity_relative_to_car": (np.linalg.norm(relative, axis=1), "m/s"),
-        "velocity_relative_to_car_x": (relative[:, 0], "m/s"),
-        "velocity_relative_to_car_y": (relative[:, 1], "m/s"),
-        "velocity_relative_to_car_z": (relative[:, 2], "m/s"),
-        "car_force": (sampled(R_HEAD_CAR), "N"),
-        "road_force": (sampled(R_HEAD_ROAD), "N"),
+    def column(k: int) -> Callable[[], Array]:
+        return lambda: signals.sampled(k, 1)[:, 0]
+
+    def resultant(first: int) -> Callable[[], Array]:
+        return lambda: np.asarray(np.linalg.norm(signals.sampled(first, 3), axis=1))
+
+    def spin(k: int) -> Callable[[], Array]:
+        return lambda: signals.spin[:, k]
+
+    zones = raw.crash.vehicle.zones
+    sources: dict[str, dict[str, tuple[str, Callable[[], Array]]]] = {
+        "head": {
+            "acceleration": ("g", lambda: signals.acceleration),
+            "angular_velocity": ("rad/s", lambda: np.linalg.norm(signals.spin, axis=1)),
+            **{f"angular_velocity_{axis}": ("rad/s", spin(k)) for k, axis in enumerate("xyz")},
+            "angular_acceleration": ("rad/s2", lambda: np.linalg.norm(signals.spin_rate, axis=1)),
+            "velocity_relative_to_car": ("m/s", resultant(R_RELATIVE)),
+            **{
+                f"velocity_relative_to_car_{axis}": ("m/s", column(R_RELATIVE + k))
+                for k, axis in enumerate("xyz")
+            },
+            "car_force": ("N", column(R_HEAD_CAR)),
+            "road_force": ("N", column(R_HEAD_ROAD)),
+        },
+        "contact_force": {
+            **{zone.name: ("N", column(R_ZONES + j)) for j, zone in enumerate(zones)},
+            "road": ("N", column(R_ZONES + len(zones))),
+        },
+        "centre_of_gravity": {axis: ("m", column(R_CENTRE + k)) for k, axis in enumerate("xyz")},
     }
-    contact = {
-        zone.name: (sampled(R_ZONES + j), "N") for j, zone in enumerate(raw.crash.vehicle.zones)
-    }
-    contact["road"] = (sampled(R_ZONES + len(raw.crash.vehicle.zones)), "N")
-    centre = {axis: (sampled(R_CENTRE + k), "m") for k, axis in enumerate(("x", "y", "z"))}
-    work = {name: (np.array([raw.work[k]]), "J") for k, name in enumerate(WORK_CHANNELS)}
-    end = np.array([raw.summary[S_TIME]])
-    return {
-        "head": history_of(time, head),
-        "contact_force": history_of(time, contact),
-        "centre_of_gravity": history_of(time, centre),
-        "work": history_of(end, work),
-    }
+    found = chosen_histories(signals.time, sources, wanted)
+    if wanted is None:
+        work = {name: (np.array([raw.work[k]]), "J") for k, name in enumerate(WORK_CHANNELS)}
+        found["work"] = history_of(np.array([raw.summary[S_TIME]]), work)
+    return found
 
 
 def scene(raw: Raw) -> Scene:

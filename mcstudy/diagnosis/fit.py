@@ -144,7 +144,7 @@ def fit(
 
     Parameters
     ----------
-    known : slopes from a fit near by, to begin with.
+    known : slopes from a fit near by, to begin with; the last form's may be missing.
     exact : whether the slopes must be those of the most probable scores in the end.
     weight : of the data against the priors; below 1 a misfit is taken less seriously, so that a
         fit from far away does not end in the wrong valley.
@@ -161,21 +161,25 @@ def fit(
     if seen is None:
         raise FitError("a run fails where the fit begins")
     misfit = _misfit(layouts, seen, scores, scatter, weight)
-    slopes, fresh = known, False
+    slopes, fresh, simulated = known, False, known is None
+    if known is not None and known.shared[0].shape[1] < scores.shared.size:
+        slopes = _simulate_slopes(problem, forms, layouts, scores, seen, scatter, known)
     for step in range(most + 1):
         if slopes is None:
-            slopes, fresh = _simulate_slopes(problem, forms, layouts, scores, seen, scatter), True
+            slopes = _simulate_slopes(problem, forms, layouts, scores, seen, scatter)
+            fresh = simulated = True
         residuals, own = _expand(layouts, seen, scores, slopes, scatter)
         system = NormalEquations(own, slopes.shared, weight)
         planned = system.solve(residuals, scores)
         last = step == most
         better = None
-        if planned.expected_gain >= CONVERGED and not last:
+        promising = planned.expected_gain >= CONVERGED
+        if promising and not last:
             better = _descend(
                 problem, forms, layouts, scores, planned.move, scatter, misfit, weight
             )
         if better is None:
-            if fresh or last or not exact:
+            if fresh or last or not (exact or (promising and not simulated)):
                 break
             slopes = None
             continue
@@ -200,17 +204,17 @@ def fit(
 
 @dataclass(frozen=True)
 class Centre:
-    """A model linearised at scores: residuals (n,), slopes (n, q) and (n, p), a test."""
+    """A model linearised at scores: residuals (n,), slopes that took runs, own (n, q), a test."""
 
     scores: Scores
     residuals: tuple[Array, ...]
+    slopes: Slopes
     own_slopes: tuple[Array, ...]
-    shared_slopes: tuple[Array, ...]
 
     def equations(self, weight: float) -> NormalEquations:
         """Return the normal equations at a weight of the data, made once."""
         if weight not in self._made:
-            self._made[weight] = NormalEquations(self.own_slopes, self.shared_slopes, weight)
+            self._made[weight] = NormalEquations(self.own_slopes, self.slopes.shared, weight)
         return self._made[weight]
 
     @functools.cached_property
@@ -231,7 +235,7 @@ def linearise(
         return None
     slopes = _simulate_slopes(problem, forms, layouts, scores, seen, scatter)
     residuals, own = _expand(layouts, seen, scores, slopes, scatter)
-    return Centre(scores, tuple(residuals), tuple(own), slopes.shared)
+    return Centre(scores, tuple(residuals), slopes, tuple(own))
 
 
 def residuals_at(
@@ -304,27 +308,30 @@ def _simulate_slopes(
     scores: Scores,
     seen: Sequence[Observation],
     scatter: Scatter,
+    known: Slopes | None = None,
 ) -> Slopes:
-    """Return the slopes that take runs, by a step to whichever side runs."""
+    """Return the slopes that take runs, by a step to whichever side runs.
+
+    Those that are known already are kept; the shared ones that are missing come last.
+    """
     residuals = [
         layout.residual(observation, own, scatter)
         for layout, observation, own in zip(layouts, seen, scores.own, strict=True)
     ]
-    here = _common(problem, forms, scores.shared)
-    doubtful = []
-    for layout, own, residual in zip(layouts, scores.own, residuals, strict=True):
-        table = np.zeros((residual.size, len(layout.test.doubtful)))
-        for k in range(table.shape[1]):
-            for step in (OWN_STEP, -OWN_STEP):
-                moved = own.copy()
-                moved[k] += step
-                there = _observe(problem, here, layout, moved)
-                if there is not None:
-                    table[:, k] = (residual - layout.residual(there, moved, scatter)) / step
-                    break
-        doubtful.append(table)
+    doubtful = (
+        known.doubtful
+        if known
+        else _doubtful(
+            problem, _common(problem, forms, scores.shared), layouts, scores, residuals, scatter
+        )
+    )
     shared = [np.zeros((residual.size, scores.shared.size)) for residual in residuals]
-    for k in range(scores.shared.size):
+    there_already = 0
+    if known:
+        there_already = known.shared[0].shape[1]
+        for table, kept in zip(shared, known.shared, strict=True):
+            table[:, :there_already] = kept
+    for k in range(there_already, scores.shared.size):
         for step in (SHARED_STEP, -SHARED_STEP):
             moved_shared = scores.shared.copy()
             moved_shared[k] += step
@@ -334,6 +341,30 @@ def _simulate_slopes(
                     table[:, k] = (residual - other) / step
                 break
     return Slopes(tuple(doubtful), tuple(shared))
+
+
+def _doubtful(
+    problem: Problem,
+    common: _Common,
+    layouts: Sequence[Layout],
+    scores: Scores,
+    residuals: Sequence[Array],
+    scatter: Scatter,
+) -> tuple[Array, ...]:
+    """Return the slopes in the inputs that are recorded with an uncertainty."""
+    tables = []
+    for layout, own, residual in zip(layouts, scores.own, residuals, strict=True):
+        table = np.zeros((residual.size, len(layout.test.doubtful)))
+        for k in range(table.shape[1]):
+            for step in (OWN_STEP, -OWN_STEP):
+                moved = own.copy()
+                moved[k] += step
+                there = _observe(problem, common, layout, moved)
+                if there is not None:
+                    table[:, k] = (residual - layout.residual(there, moved, scatter)) / step
+                    break
+        tables.append(table)
+    return tuple(tables)
 
 
 def _descend(

@@ -27,6 +27,8 @@ PULSE = 0.02
 """Share of the peak at which a pulse begins and ends."""
 BIN = 5e-5
 """s: finer samples are averaged."""
+LEAD = 5e-3
+"""s by which a simulation may begin before the recording."""
 
 
 @dataclass(frozen=True)
@@ -245,6 +247,9 @@ def lay_out(test: Test, seen: Observation) -> Layout:
         return Layout(test, 0.0, (0.0, 1.0))
     signal = test.signals[0]
     time, values = seen.signals[signal.name]
+    # A simulation may go on for longer than a test was recorded, to impacts of its own.
+    recorded = time - time[0] <= signal.time[-1] - signal.time[0] + LEAD
+    time, values = time[recorded], values[recorded]
     large = np.flatnonzero(np.abs(values) >= PULSE * np.abs(values).max())
     window = (float(time[large[0]]), float(time[large[-1]]))
     shift = _shift(signal.time, signal.values, time, values)

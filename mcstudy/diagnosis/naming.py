@@ -12,6 +12,7 @@ from mcstudy.diagnosis.fit import (
     Centre,
     Fit,
     FitError,
+    Slopes,
     fit,
     linearise,
     residuals_at,
@@ -105,15 +106,19 @@ def rescale(layouts: Sequence[Layout], fitted: Fit, scatter: Scatter) -> Scores:
 
 @dataclass(frozen=True)
 class Survey:
-    """A form tried over its prior: misfits and the scores to start from, most promising first.
+    """A form tried over its prior.
 
-    ``weight`` is that of the data: the larger the misfit without the form, the less.
+    Attributes
+    ----------
+    form : Form. weight : of the data: the larger the misfit without the form, the less.
+    misfit : of the most promising start.
+    starts : scores to start from with slopes near by, most promising first.
     """
 
     form: Form
     weight: float
-    misfits: tuple[float, ...]
-    starts: tuple[Scores, ...]
+    misfit: float
+    starts: tuple[tuple[Scores, Slopes], ...]
 
     @property
     def far(self) -> bool:
@@ -141,7 +146,7 @@ def survey(
     samples = sum(r.size for r in centres[0].residuals)
     least = min(solve(centre, centre.residuals, 1.0)[1] for centre in centres)
     weight = min(1.0, float(np.sqrt(0.5 * samples / least)))
-    best: list[tuple[float, Scores]] = []
+    best: list[tuple[float, Scores, Slopes]] = []
     changes = 0.0
     for centre in centres:
         tried: list[tuple[float, Scores]] = []
@@ -158,11 +163,11 @@ def survey(
             whole = misfit + 0.5 * float(scores @ scores)
             tried.append((whole, Scores(np.concatenate([shared, scores]), own)))
         if tried:
-            best.append(min(tried, key=lambda entry: entry[0]))
+            best.append((*min(tried, key=lambda entry: entry[0]), centre.slopes))
     if changes < UNSEEN:
         return None
     best.sort(key=lambda entry: entry[0])
-    return Survey(form, weight, tuple(m for m, _ in best), tuple(start for _, start in best))
+    return Survey(form, weight, best[0][0], tuple((start, slopes) for _, start, slopes in best))
 
 
 def approach(
@@ -174,16 +179,19 @@ def approach(
     """
     forms = (*forms, surveyed.form)
     best: Fit | None = None
-    for start in surveyed.starts:
+    for start, slopes in surveyed.starts:
         try:
             for stage in (surveyed.weight, np.sqrt(surveyed.weight)) if surveyed.far else ():
                 found = fit(
-                    problem, layouts, forms, start, SURVEY,
+                    problem, layouts, forms, start, SURVEY, slopes,
                     exact=False, weight=stage, most=STAGE_STEPS,
                 )  # fmt: skip
+                slopes = found.slopes
                 # What tests put down to nuisances while the shared values were wrong is forgotten.
                 start = Scores(found.scores.shared, tuple(np.zeros_like(z) for z in start.own))
-            found = fit(problem, layouts, forms, start, SURVEY, exact=False, most=STAGE_STEPS)
+            found = fit(
+                problem, layouts, forms, start, SURVEY, slopes, exact=False, most=STAGE_STEPS
+            )
         except FitError:
             continue
         if best is None or found.log_evidence > best.log_evidence:
@@ -219,11 +227,11 @@ def rank_causes(
     forms = [form for c in causes if c.name not in taken for form in c.forms]
     pool = Parallel(n_jobs=workers)
     surveys = pool(delayed(survey)(problem, layouts, base.forms, centres, form) for form in forms)
-    seen = sorted((s for s in surveys if s is not None), key=lambda s: s.misfits[0])
+    seen = sorted((s for s in surveys if s is not None), key=lambda s: s.misfit)
     promising = [
         s
         for k, s in enumerate(seen[:most])
-        if k < FEWEST or s.misfits[0] < WORSE * seen[0].misfits[0] + CLOSE
+        if k < FEWEST or s.misfit < WORSE * seen[0].misfit + CLOSE
     ]
     first = pool(delayed(approach)(problem, layouts, base.forms, s) for s in promising)
     reached = [found for found in first if found is not None]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from models.criteria.filters import filter_cfc
+from models.criteria.filters import CUTOFF_FACTOR, filter_cfc
 from models.effects.chain import EffectChain
 
 Array = NDArray[np.float64]
@@ -44,7 +44,8 @@ def record_reading(
     """
     reading = chain.act("signal", reading, values)
     signal = reading.acceleration
-    if reading.channel_class > 0.0:
+    # A corner above half the sampling rate leaves what was sampled as it is.
+    if 0.0 < CUTOFF_FACTOR * reading.channel_class < 0.5 * sampling_rate:
         signal = filter_cfc(signal, sampling_rate, reading.channel_class)
     if reading.clock == 1.0:
         return signal

@@ -40,7 +40,7 @@ def make_accidents(
     model = load_model(study.model.name, study.model.options)
     spare = 2 * accidents
     columns = config.map_inputs(study, model, rng.random((spare, len(study.inputs))))
-    altered = _altered({k: v.copy() for k, v in columns.items()}, hidden)
+    altered = alter({k: v.copy() for k, v in columns.items()}, hidden)
     names = [item.name for item in model.inputs]
     batch = model.run_batch(np.stack([altered[name] for name in names], axis=1))
     outputs = {item.name: batch.outputs[:, k] for k, item in enumerate(model.outputs)}
@@ -59,7 +59,7 @@ def make_accidents(
     (folder / "measured.toml").write_text(_header(study), encoding="utf-8")
 
 
-def _altered(columns: dict[str, Array], hidden: Sequence[Hidden]) -> dict[str, Array]:
+def alter(columns: dict[str, Array], hidden: Sequence[Hidden]) -> dict[str, Array]:
     """Return the inputs as they truly were."""
     for h in hidden:
         if h.name == "brake_dive":

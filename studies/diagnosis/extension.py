@@ -39,7 +39,7 @@ def base_study(data: Measured, choice: ModelChoice, problem: Problem, name: str)
         lines.append(f"options = {_toml(options)}")
     lines += ["", "[design]", 'method = "latin-hypercube"', f"n = {RUNS}"]
     lines += [f"replicate_size = {REPLICATE}"]
-    sampled = set(data.header.inputs) | set(data.header.uncertain)
+    sampled = set(data.header.inputs) | set(choice.uncertain)
     for key, value in choice.fixed.items():
         if key not in sampled:
             lines += ["", f"[fixed.{key}]", f"value = {value!r}", f'unit = "{_unit(choice, key)}"']
@@ -51,7 +51,7 @@ def base_study(data: Measured, choice: ModelChoice, problem: Problem, name: str)
         else:
             lines += ["", f"[fixed.{key}]", f"value = {float(values[0])!r}"]
             lines += [f'unit = "{_unit(choice, key)}"']
-    for key, distribution in data.header.uncertain.items():
+    for key, distribution in choice.uncertain.items():
         table = distribution.model_dump(mode="json", exclude_none=True)
         unit = table.pop("unit")
         lines += _input(key, table, unit)

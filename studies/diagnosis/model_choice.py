@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from mcstudy import config
-from mcstudy.config import Study, load_study
+from mcstudy.config import SampledStudy, Study, load_study
 from mcstudy.errors import UserError
+from mcstudy.inputs import Distribution
 from mcstudy.measured import HEADER, Measured
 from models.registry import load_model, model_names
 
@@ -19,6 +20,8 @@ class ModelChoice:
     Attributes
     ----------
     name, options : of the model. effects : already switched on. fixed : inputs.
+    uncertain : inputs that all tests share, with what is known of them: those that the data call
+        uncertain, then those that the study file samples and the data do not state.
     study : the study file that it comes from, with its text; None without one.
     """
 
@@ -26,6 +29,7 @@ class ModelChoice:
     options: Mapping[str, Any]
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     fixed: Mapping[str, float] = field(default_factory=dict)
+    uncertain: Mapping[str, Distribution] = field(default_factory=dict)
     study: Study | None = None
     text: str = ""
 
@@ -88,4 +92,9 @@ def choose_model(data: Measured, file: Path | None) -> ModelChoice:
                 f"{item.high:g} {item.unit}"
             )
         fixed[name] = float(value)
-    return ModelChoice(header.model, options, effects, fixed, study, text)
+    uncertain = dict(header.uncertain)
+    # What differs from accident to accident is no unknown that they share.
+    if isinstance(study, SampledStudy) and signals:
+        stated = {*header.inputs, *header.uncertain, *header.fixed}
+        uncertain |= {k: d for k, d in study.inputs.items() if k not in stated}
+    return ModelChoice(header.model, options, effects, fixed, uncertain, study, text)

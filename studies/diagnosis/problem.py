@@ -48,7 +48,7 @@ def build_problem(data: Measured, choice: ModelChoice, simulation: Simulation) -
     model, header = simulation.model(()), data.header
     place = data.source / HEADER
     inputs = {item.name: item for item in model.inputs}
-    for table in (header.uncertain, header.inputs):
+    for table in (choice.uncertain, header.inputs):
         for name in table:
             if name not in inputs:
                 raise UserError(
@@ -71,7 +71,7 @@ def build_problem(data: Measured, choice: ModelChoice, simulation: Simulation) -
         tests=tests,
         unknowns=tuple(
             Unknown(name, _quantile_of(place, name, distribution, inputs[name].unit))
-            for name, distribution in header.uncertain.items()
+            for name, distribution in choice.uncertain.items()
         ),
         simulate=simulation,
         ranges={name: (item.low, item.high) for name, item in inputs.items()},

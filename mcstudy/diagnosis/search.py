@@ -40,6 +40,8 @@ SECOND_SHARE = 0.02
 best form of it leaves a little."""
 ALMOST_ALL = 0.98
 """Share of the explained misfit from which no second cause is looked for."""
+FAINT_SHARE = 0.003
+"""The same where the first cause alone leaves nothing that a general test would see."""
 NOTABLE = 0.1
 """Share of the first cause's evidence that a second one must add where they leave structure."""
 FURTHER = 4.5
@@ -177,7 +179,8 @@ def _judge(
         return alone
     if not clean and left.share >= ALMOST_ALL:
         return flagged
-    pair = _best_pair(problem, causes, empty, candidates, workers)
+    share = FAINT_SHARE if clean else SECOND_SHARE
+    pair = _best_pair(problem, causes, empty, candidates, share, workers)
     if pair is not None:
         explained = pair.remainder.p_value >= STRUCTURE
         return replace(
@@ -231,9 +234,13 @@ def _best_pair(
     causes: Sequence[Cause],
     empty: Finding,
     candidates: Sequence[Candidate],
+    share: float,
     workers: int,
 ) -> _Pair | None:
-    """Return the pair of causes that explains the misfit, if one does and no single one can."""
+    """Return the pair of causes that explains the misfit, if one does and no single one can.
+
+    ``share`` is that of the first cause's evidence that the second one must add.
+    """
     best: _Pair | None = None
     for first in candidates[:PAIRS]:
         if first.log_evidence < RIVAL * candidates[0].log_evidence:
@@ -253,6 +260,6 @@ def _best_pair(
         return None
     added, sole = best.seconds[0].log_evidence, best.first.log_evidence
     if best.remainder.p_value >= STRUCTURE:
-        return best if added >= max(SECOND, SECOND_SHARE * sole) else None
+        return best if added >= max(SECOND, share * sole) else None
     most = best.remainder.share >= ALMOST_ALL and added >= NOTABLE * sole
     return best if most else None

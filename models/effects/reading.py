@@ -27,13 +27,21 @@ class Reading:
     clock: float = 1.0
 
 
+@dataclass(frozen=True)
+class Record:
+    """What a recorder wrote down: acceleration (n, axes) in g, and its clock over the true one."""
+
+    acceleration: Array
+    clock: float
+
+
 def record_reading(
     chain: EffectChain,
     values: Mapping[str, float],
     reading: Reading,
     sampling_rate: float,
     origin: int,
-) -> Array:
+) -> Record:
     """Return the acceleration (g) as it is written down, with the chain's effects on the signal.
 
     Parameters
@@ -47,9 +55,18 @@ def record_reading(
     # A corner above half the sampling rate leaves what was sampled as it is.
     if 0.0 < CUTOFF_FACTOR * reading.channel_class < 0.5 * sampling_rate:
         signal = filter_cfc(signal, sampling_rate, reading.channel_class)
-    if reading.clock == 1.0:
-        return signal
-    # What the recorder calls a time is the true one times the clock's factor.
-    sample = np.arange(signal.shape[0])
-    true = origin + (sample - origin) / reading.clock
-    return np.stack([np.interp(true, sample, column) for column in signal.T], axis=1)
+    columns = [retime(column, reading.clock, origin) for column in signal.T]
+    return Record(np.stack(columns, axis=1), reading.clock)
+
+
+def retime(values: Array, clock: float, origin: int) -> Array:
+    """Return a channel (n,) as a recorder writes it whose clock is off.
+
+    Parameters
+    ----------
+    clock : recorded duration over the true one. origin : sample at which both agree.
+    """
+    if clock == 1.0:
+        return values
+    sample = np.arange(values.size)
+    return np.interp(origin + (sample - origin) / clock, sample, values)

@@ -23,7 +23,7 @@ from models.contact.law import (
 from models.criteria.units import STANDARD_GRAVITY
 from models.declaration import read_inputs, read_outputs, run_rows
 from models.effects.chain import build_chain
-from models.effects.reading import Reading, record_reading
+from models.effects.reading import Reading, Record, record_reading
 from models.effects.registry import effects_of
 from models.headform import outcome
 from models.headform.contact import HeadformContact
@@ -295,13 +295,13 @@ class HeadformModel:
             impactor=impactor,
             speeds=speeds,
             record=kept,
-            acceleration=self._acceleration(kept, mass, values),
+            reading=self._reading(kept, mass, values),
             summary=summary,
             dent=(hood, hood * (1.0 - 1.0 / curve.unloading_ratio)),
         )
 
-    def _acceleration(self, record: Array, mass: float, values: Mapping[str, float]) -> Array:
-        """Return normal and tangential acceleration (g) with flight before and after, filtered."""
+    def _reading(self, record: Array, mass: float, values: Mapping[str, float]) -> Record:
+        """Return normal and tangential acceleration with flight before and after, filtered."""
         quiet = round(QUIET * SAMPLING_RATE)
         padded = np.zeros((record.shape[0] + 2 * quiet, 2))
         forces = record[:, NORMAL : TANGENTIAL + 1]

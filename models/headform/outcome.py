@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.criteria import clip_level, head_injury_criterion
+from models.effects.reading import Record, retime
 from models.headform.impact import (
     END_SLIDE,
     END_SPIN,
@@ -32,19 +33,19 @@ QUIET = 0.005
 
 @dataclass(frozen=True)
 class Test:
-    """One test: impactor, initial speeds, what the loop left behind and the accelerometer read."""
+    """One test: impactor, initial speeds, what the loop left behind and the recorder wrote down."""
 
     impactor: Impactor
     speeds: tuple[float, float]
     record: Array
-    acceleration: Array
+    reading: Record
     summary: Array
     dent: tuple[float, float]
 
 
 def measures(test: Test) -> dict[str, Callable[[], float]]:
     """Return how each output is had from a test that ended, by name."""
-    acceleration = np.hypot(*test.acceleration.T)
+    acceleration = np.hypot(*test.reading.acceleration.T)
     time = np.arange(acceleration.size) / SAMPLING_RATE
     record, summary = test.record, test.summary
     energy = 0.5 * test.impactor.mass * (test.speeds[0] ** 2 + test.speeds[1] ** 2)
@@ -81,20 +82,26 @@ def histories(test: Test, wanted: Collection[str] | None) -> dict[str, History]:
         longer[-quiet:] = end
         return longer
 
+    def recorded(values: Array) -> Array:
+        # One recorder for all that is measured.
+        return retime(values, test.reading.clock, quiet)
+
     sources: dict[str, dict[str, tuple[str, Callable[[], Array]]]] = {
         "head": {
-            "acceleration": ("g", lambda: np.hypot(*test.acceleration.T)),
-            "acceleration_normal": ("g", lambda: test.acceleration[:, 0]),
-            "acceleration_tangential": ("g", lambda: test.acceleration[:, 1]),
+            "acceleration": ("g", lambda: np.hypot(*test.reading.acceleration.T)),
+            "acceleration_normal": ("g", lambda: test.reading.acceleration[:, 0]),
+            "acceleration_tangential": ("g", lambda: test.reading.acceleration[:, 1]),
             "velocity_normal": ("m/s", lambda: padded(RATE, rate, last[RATE])),
             "velocity_tangential": ("m/s", lambda: padded(SLIDE, slide, last[SLIDE])),
             "angular_velocity": ("rad/s", lambda: padded(SPIN, 0.0, last[SPIN])),
         },
         "hood": {
-            "force": ("N", lambda: padded(NORMAL, 0.0, 0.0)),
+            "force": ("N", lambda: recorded(padded(NORMAL, 0.0, 0.0))),
             "penetration": (
                 "m",
-                lambda: padded(PENETRATION, before * rate, last[PENETRATION] + after * last[RATE]),
+                lambda: recorded(
+                    padded(PENETRATION, before * rate, last[PENETRATION] + after * last[RATE])
+                ),
             ),
         },
     }

@@ -107,7 +107,7 @@ class Signals:
         raw = self._raw
         felt = Reading(self.sampled(R_ACCELERATION, 3) / STANDARD_GRAVITY, LINEAR_CLASS)
         read = record_reading(raw.chain, raw.values, felt, SAMPLING_RATE, origin=0)
-        return np.asarray(np.linalg.norm(read, axis=1))
+        return np.asarray(np.linalg.norm(read.acceleration, axis=1))
 
     @functools.cached_property
     def spin(self) -> Array:

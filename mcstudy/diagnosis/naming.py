@@ -47,7 +47,9 @@ FAR = 0.7
 FARTHEST_START = 3.0
 """Score beyond which no fit begins."""
 CLOSE, WORSE = 60.0, 1.4
-"""Log units and factor by which a form may promise less than the best."""
+"""Log units and factor by which a form far from the data may fit worse than the best."""
+MODEST, SLIGHT = 4.0, 6.0
+"""Factor and log units by which a form near the data may promise less than the best."""
 HOPELESS = 1.5
 """Factor on the best misfit beyond which a form is not fitted any further."""
 STAGE_STEPS = 6
@@ -112,12 +114,14 @@ class Survey:
     ----------
     form : Form. weight : of the data: the larger the misfit without the form, the less.
     misfit : of the most promising start.
+    promise : log units that the form would gain if only its size were free.
     starts : scores to start from with slopes near by, most promising first.
     """
 
     form: Form
     weight: float
     misfit: float
+    promise: float
     starts: tuple[tuple[Scores, Slopes], ...]
 
     @property
@@ -147,8 +151,9 @@ def survey(
     least = min(solve(centre, centre.residuals, 1.0)[1] for centre in centres)
     weight = min(1.0, float(np.sqrt(0.5 * samples / least)))
     best: list[tuple[float, Scores, Slopes]] = []
-    changes = 0.0
+    changes = promise = 0.0
     for centre in centres:
+        without = solve(centre, centre.residuals, weight)[1]
         tried: list[tuple[float, Scores]] = []
         for scores in score_grid(form, fine=weight < FAR):
             start = Scores(np.concatenate([centre.scores.shared, scores]), centre.scores.own)
@@ -158,6 +163,8 @@ def survey(
             for found, before in zip(residuals, centre.residuals, strict=True):
                 changes = max(changes, float(np.sum((found - before) ** 2)))
             solved, misfit = solve(centre, residuals, weight)
+            halfway = [0.5 * (r + b) for r, b in zip(residuals, centre.residuals, strict=True)]
+            promise = max(promise, _gain(without, solve(centre, halfway, weight)[1], misfit))
             shared = np.clip(solved.shared, -FARTHEST_START, FARTHEST_START)
             own = tuple(np.clip(z, -FARTHEST_START, FARTHEST_START) for z in solved.own)
             whole = misfit + 0.5 * float(scores @ scores)
@@ -167,7 +174,22 @@ def survey(
     if changes < UNSEEN:
         return None
     best.sort(key=lambda entry: entry[0])
-    return Survey(form, weight, best[0][0], tuple((start, slopes) for _, start, slopes in best))
+    starts = tuple((start, slopes) for _, start, slopes in best)
+    return Survey(form, weight, best[0][0], promise, starts)
+
+
+def _gain(none: float, half: float, whole: float) -> float:
+    """Return by how much the parabola through misfits at none, half and all of a change falls."""
+    curvature = 2.0 * (none + whole - 2.0 * half)
+    slope = whole - none - curvature
+    return slope**2 / (4.0 * curvature) if slope < 0.0 < curvature else 0.0
+
+
+def _may_win(surveyed: Survey, misfit: float, promise: float) -> bool:
+    """Return whether a form may turn out better than those with the best misfit and promise."""
+    if surveyed.far:
+        return surveyed.misfit < WORSE * misfit + CLOSE
+    return MODEST * surveyed.promise + SLIGHT > promise
 
 
 def approach(
@@ -228,10 +250,9 @@ def rank_causes(
     pool = Parallel(n_jobs=workers)
     surveys = pool(delayed(survey)(problem, layouts, base.forms, centres, form) for form in forms)
     seen = sorted((s for s in surveys if s is not None), key=lambda s: s.misfit)
+    best = max((s.promise for s in seen), default=0.0)
     promising = [
-        s
-        for k, s in enumerate(seen[:most])
-        if k < FEWEST or s.misfit < WORSE * seen[0].misfit + CLOSE
+        s for k, s in enumerate(seen[:most]) if k < FEWEST or _may_win(s, seen[0].misfit, best)
     ]
     first = pool(delayed(approach)(problem, layouts, base.forms, s) for s in promising)
     reached = [found for found in first if found is not None]

@@ -1,6 +1,6 @@
 """The search: adequate or not, which cause, whether a second one, or none of the catalogue."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,6 +52,12 @@ PAIRS = 2
 """Causes, best first, with which a second one is tried."""
 
 UNEXPLAINED = "unexplained"
+
+Tell = Callable[[str], None]
+
+
+def _silent(_text: str) -> None:
+    """Tell nothing."""
 
 
 @dataclass(frozen=True)
@@ -115,17 +121,24 @@ def fit_base(problem: Problem) -> tuple[tuple[Layout, ...], Fit]:
 
 
 def search(
-    problem: Problem, causes: Sequence[Cause], *, seed: int = 0, workers: int = 1
+    problem: Problem,
+    causes: Sequence[Cause],
+    *,
+    seed: int = 0,
+    workers: int = 1,
+    tell: Tell = _silent,
 ) -> Finding:
     """Return what the simulation gets wrong, if anything, and why.
 
     Parameters
     ----------
     problem : Problem. causes : of the catalogue. seed : of the simulated data sets.
-    workers : processes, -1 for one a core.
+    workers : processes, -1 for one a core. tell : takes what is being done, in words.
     """
     rng = np.random.default_rng(seed)
+    tell("fitting the model as it stands")
     layouts, base = fit_base(problem)
+    tell("is it adequate?")
     bank = tuple(cause_templates(problem, layouts, base, all_forms(causes)))
     screening = screen(
         base,
@@ -142,9 +155,10 @@ def search(
     )  # fmt: skip
     if screening.p_value > LEVEL:
         return empty
+    tell("it is not: trying the causes")
     settled = settle(problem, layouts, base)
     candidates = rank_causes(problem, layouts, settled, causes, workers, SINGLES)
-    return _judge(problem, causes, replace(empty, base=settled), tuple(candidates), workers)
+    return _judge(problem, causes, replace(empty, base=settled), tuple(candidates), workers, tell)
 
 
 def _judge(
@@ -153,6 +167,7 @@ def _judge(
     empty: Finding,
     candidates: tuple[Candidate, ...],
     workers: int,
+    tell: Tell,
 ) -> Finding:
     """Return the finding for ranked candidates."""
     nothing = replace(empty, candidates=candidates, cause=UNEXPLAINED)
@@ -179,6 +194,7 @@ def _judge(
         return alone
     if not clean and left.share >= ALMOST_ALL:
         return flagged
+    tell(f"looking for a second cause beside {best.cause.name}")
     share = FAINT_SHARE if clean else SECOND_SHARE
     pair = _best_pair(problem, causes, empty, candidates, share, workers)
     if pair is not None:

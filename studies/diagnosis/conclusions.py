@@ -32,7 +32,7 @@ class Conclusions:
 def conclude(text: str) -> Conclusions | None:
     """Return the conclusions of a study file; None if it has none, or too many runs fail."""
     study = parse_study(text, "extended model")
-    if not isinstance(study, MonteCarloStudy | SobolStudy):
+    if not isinstance(study, MonteCarloStudy | SobolStudy) or not study.inputs:
         return None
     model = load_study_model(study)
     n = RUNS[model.name]

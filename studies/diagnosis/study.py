@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -83,7 +84,7 @@ def diagnose(
         problem, source_of_extras = build_collection(
             problem, data, choice, causes, seed=seed, workers=workers, quiet=quiet
         )
-    finding = search(problem, causes, seed=seed, workers=workers)
+    finding = search(problem, causes, seed=seed, workers=workers, tell=partial(say, quiet=quiet))
     say(finding.why, quiet=quiet)
     with folder.open_for_writing():
         return _write(data, choice, problem, source_of_extras, causes, finding, folder, seed, quiet)

@@ -137,9 +137,15 @@ def gain_words(gains: Sequence[Mapping[str, Any]]) -> list[str]:
             if entry["score"] != score or not entry["base"]:
                 continue
             d = {key: 100.0 * value for key, value in entry["relative"].items()}
+            better = d["value"] >= 0.0
+            low, high = sorted((abs(d["low"]), abs(d["high"])))
+            if d["low"] < 0.0 < d["high"]:
+                spread = f"{d['low']:.0f} to {d['high']:.0f} %: it may be none"
+            else:
+                spread = f"{low:.0f} to {high:.0f} %"
             lines.append(
                 f"{capital(entry['region'])} the speeds used, predictions of {name} are "
-                f"{d['value']:.0f} % better (CRPS, {d['low']:.0f} to {d['high']:.0f} %)."
+                f"{abs(d['value']):.0f} % {'better' if better else 'worse'} (CRPS, {spread})."
             )
     return lines
 

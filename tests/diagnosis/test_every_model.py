@@ -1,4 +1,4 @@
-"""A diagnosis of every kind of data: ISO-MME tests and full-scale tests of the crash core."""
+"""A diagnosis of every kind of data: ISO-MME, full-scale tests and accidents of the crash core."""
 
 from pathlib import Path
 
@@ -6,10 +6,23 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from mcstudy.diagnosis.problem import Cause
+from mcstudy.diagnosis.screening import score_templates
+from mcstudy.diagnosis.search import fit_base, search
+from mcstudy.diagnosis.templates import all_forms, cause_templates
 from mcstudy.isomme import write_test
+from mcstudy.measured import load_measured
 from mcstudy.results import ResultsFolder
-from studies.diagnosis.study import diagnose
+from studies.diagnosis import accidents
+from studies.diagnosis.catalogue import causes_of
+from studies.diagnosis.model_choice import choose_model
+from studies.diagnosis.problem import build_problem
+from studies.diagnosis.study import diagnose, simulation_of
+from studies.validation.diagnosis.hidden_accidents import make_accidents
+from studies.validation.diagnosis.hidden_crashes import make_crashes
 from studies.validation.diagnosis.hidden_effects import CURVE, Hidden, Laboratory, make_tests
+
+ACCIDENTS = Path("configs/accidents.toml")
 
 STUDY = f"""format = "mcstudy-study/1"
 kind = "monte-carlo"
@@ -64,3 +77,48 @@ def test_isomme_tests_are_diagnosed_with_the_model_of_a_study_file(tmp_path: Pat
     assert limit["value"] == pytest.approx(110.0, abs=2.0)
     # The hood's stiffness is what the study file samples and the tests do not state.
     assert "[inputs.hood_force_scale]" in (tmp_path / "out" / "extended.toml").read_text()
+
+
+def chosen(*names: str) -> tuple[Cause, ...]:
+    return tuple(cause for cause in causes_of("multibody") if cause.name in names)
+
+
+def test_full_scale_tests_of_the_crash_core_show_a_clipped_signal(tmp_path: Path) -> None:
+    make_crashes(tmp_path / "data", [Hidden("sensor_saturation", "", {"limit": 60.0})], 1, tests=3)
+    data = load_measured(tmp_path / "data")
+    choice = choose_model(data, None)
+    problem = build_problem(data, choice, simulation_of(data, choice))
+    # HIC15 follows from the signal; throw and wrap-around distance are evidence of their own.
+    assert [scalar.name for scalar in problem.tests[0].scalars] == ["throw_distance", "wad"]
+    layouts, base = fit_base(problem)
+    causes = chosen("sensor_saturation", "sensor_offset", "wet_road")
+    bank = cause_templates(problem, layouts, base, all_forms(causes))
+    score, information = score_templates(base, layouts, bank)
+    standard = np.abs(score) / np.sqrt(np.where(information > 0.0, information, np.inf))
+    best = bank[int(np.argmax(standard))]
+    assert best.form.cause == "sensor_saturation"
+    assert standard.max() > 4.0
+
+
+@pytest.mark.slow
+def test_accidents_with_a_wet_road_are_diagnosed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(accidents, "POOL", 160)
+    monkeypatch.setattr(accidents, "PAIRED", 60)
+    hidden = [Hidden("wet_road", "", {"place": 5.0, "factor": 0.5})]
+    make_accidents(tmp_path / "data", ACCIDENTS, hidden, 4)
+    data = load_measured(tmp_path / "data")
+    choice = choose_model(data, ACCIDENTS)
+    problem = build_problem(data, choice, simulation_of(data, choice))
+    causes = chosen("wet_road", "brake_dive")
+    problem, emulator = accidents.build_collection(
+        problem, data, choice, causes, seed=1, workers=1, quiet=True
+    )
+    found = search(problem, causes)
+    assert found.cause == "wet_road"
+    # Signals it has none; a further scalar it has.
+    seen = emulator.widened({}, ["head_impact_time"])(problem.tests[0].inputs, {})
+    assert seen is not None
+    assert not seen.signals
+    assert set(seen.scalars) == {*(s.name for s in problem.tests[0].scalars), "head_impact_time"}

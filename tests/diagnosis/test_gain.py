@@ -14,6 +14,7 @@ from mcstudy.diagnosis.naming import rank_causes, settle
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.diagnosis.search import fit_base
 from mcstudy.diagnosis.templates import smooth_discrepancy
+from studies.diagnosis.words import gain_words
 
 PEAK = {"peak": ("g", "head_acceleration", lambda _t, v: float(v.max()))}
 
@@ -79,3 +80,19 @@ def test_the_process_is_that_of_dense_regression() -> None:
     variance = np.diag(process.covariance).reshape(own.shape)
     spread = np.array([np.sum(root**2, axis=1) for root in roots])
     np.testing.assert_allclose(spread, variance, rtol=0.05, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("low", "value", "high", "said"),
+    [
+        (0.1, 0.2, 0.3, "20 % better (CRPS, 10 to 30 %)"),
+        (-0.3, -0.2, -0.1, "20 % worse (CRPS, 10 to 30 %)"),
+        (-0.1, 0.2, 0.3, "20 % better (CRPS, -10 to 30 %: it may be none)"),
+    ],
+)
+def test_a_gain_is_said_as_it_is(low: float, value: float, high: float, said: str) -> None:
+    entry = {
+        "score": "crps_hic15", "region": "inside", "base": 1.0,
+        "relative": {"low": low, "value": value, "high": high},
+    }  # fmt: skip
+    assert said in gain_words([entry])[0]

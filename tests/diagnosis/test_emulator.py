@@ -1,0 +1,78 @@
+"""Quadratic surfaces of accidents, against functions that are quadratic."""
+
+import numpy as np
+import pytest
+from linear_tests import BUMP
+
+from studies.diagnosis.emulator import (
+    Change,
+    Emulator,
+    Surface,
+    change_terms,
+    fit_terms,
+    quadratic_terms,
+)
+
+
+def points(n: int, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).standard_normal((n, 2))
+
+
+def truth(x: np.ndarray) -> np.ndarray:
+    return 3.0 + 2.0 * x[:, 0] - x[:, 1] + 0.5 * x[:, 0] ** 2 - 0.3 * x[:, 0] * x[:, 1]
+
+
+def test_a_quadratic_function_is_recovered() -> None:
+    x = points(400)
+    coefficients, left = fit_terms(quadratic_terms(x), truth(x)[:, None])
+    assert np.abs(left).max() < 0.02
+    new = points(50, 1)
+    assert quadratic_terms(new) @ coefficients[:, 0] == pytest.approx(truth(new), abs=0.03)
+
+
+def test_the_mean_is_not_drawn_towards_nothing() -> None:
+    x = points(300)
+    coefficients, _ = fit_terms(quadratic_terms(x), np.full((300, 1), 1000.0))
+    assert coefficients[0, 0] == pytest.approx(1000.0)
+    assert np.abs(coefficients[1:]).max() < 1e-6
+
+
+def test_failed_runs_are_left_out() -> None:
+    x = points(400)
+    values = truth(x)[:, None]
+    values[::7] = np.nan
+    coefficients, left = fit_terms(quadratic_terms(x), values)
+    assert np.isnan(left[::7]).all()
+    assert np.isfinite(coefficients).all()
+    assert np.nanmax(np.abs(left)) < 0.02
+
+
+@pytest.mark.parametrize("centred", [True, False])
+def test_a_change_adds_to_the_surface(centred: bool) -> None:
+    """The change 2 z + 0.1 z^2 + 0.5 z x0, and beside it 4 where it is something at z = 0."""
+    x, rng = points(400), np.random.default_rng(3)
+    z = rng.uniform(-2.5, 2.5, (400, 1))
+    always = 0.0 if centred else 4.0
+    changed = always + 2.0 * z[:, 0] + 0.1 * z[:, 0] ** 2 + 0.5 * z[:, 0] * x[:, 0]
+    coefficients, _ = fit_terms(change_terms(z, x, centred=centred), changed[:, None])
+    base, _ = fit_terms(quadratic_terms(x), truth(x)[:, None])
+    form = BUMP.forms[0]
+    emulator = Emulator(
+        "multibody", ["throw_distance"],
+        Surface(("a", "b"), np.array([10.0, 5.0]), np.array([2.0, 1.0]), base),
+        [Change(form, centred, coefficients)], ["throw_distance"],
+    )  # fmt: skip
+    at = np.array([[0.5, -1.0]])
+    inputs = {"a": 11.0, "b": 4.0}
+    plain = emulator(inputs, {})
+    assert plain is not None
+    assert plain.scalars["throw_distance"] == pytest.approx(truth(at)[0], abs=0.05)
+    name = form.free[0].name
+    seen = emulator(inputs, {form.cause: {name: 1.5}})
+    assert seen is not None
+    difference = seen.scalars["throw_distance"] - plain.scalars["throw_distance"]
+    assert difference == pytest.approx(always + 3.0 + 0.225 + 0.375, abs=0.1)
+    # A cause that changes nothing of what is measured has no surface.
+    unknown = emulator(inputs, {"another": {"size": 1.0}})
+    assert unknown is not None
+    assert unknown.scalars == plain.scalars

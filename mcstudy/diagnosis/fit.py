@@ -168,7 +168,7 @@ def fit(
         if slopes is None:
             slopes = _simulate_slopes(problem, forms, layouts, scores, seen, scatter)
             fresh = simulated = True
-        residuals, own = _expand(layouts, seen, scores, slopes, scatter)
+        residuals, own = expand_tests(layouts, seen, scores, slopes, scatter)
         system = NormalEquations(own, slopes.shared, weight)
         planned = system.solve(residuals, scores)
         last = step == most
@@ -234,7 +234,7 @@ def linearise(
     if seen is None:
         return None
     slopes = _simulate_slopes(problem, forms, layouts, scores, seen, scatter)
-    residuals, own = _expand(layouts, seen, scores, slopes, scatter)
+    residuals, own = expand_tests(layouts, seen, scores, slopes, scatter)
     return Centre(scores, tuple(residuals), slopes, tuple(own))
 
 
@@ -283,14 +283,14 @@ def _misfit(
     return 0.5 * total
 
 
-def _expand(
+def expand_tests(
     layouts: Sequence[Layout],
     seen: Sequence[Observation],
     scores: Scores,
     slopes: Slopes,
     scatter: Scatter,
 ) -> tuple[list[Array], list[Array]]:
-    """Return residuals and slopes in the tests' own nuisances."""
+    """Return residuals (n,) and slopes (n, q) in the tests' own nuisances, whitened, a test."""
     residuals, owns = [], []
     for layout, observation, own, doubtful in zip(
         layouts, seen, scores.own, slopes.doubtful, strict=True

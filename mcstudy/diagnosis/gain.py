@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcstudy.diagnosis.discrepancy import Discrepancy, fit_discrepancy
-from mcstudy.diagnosis.fit import Fit, FitError, Slopes, fit, observe_tests
+from mcstudy.diagnosis.fit import Fit, FitError, Slopes, expand_tests, fit, observe_tests
 from mcstudy.diagnosis.layout import Layout, Scatter
 from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Problem
@@ -126,10 +126,14 @@ def _score(
         except FitError:
             continue
         part = [layouts[i] for i in kept]
-        shapes = smooth_discrepancy(part, trained["base"])
+        plain = _untouched(problem, part, trained["base"])
+        blank = _untouched(problem, [layouts[i] for i in held], _of_tests(base, held))
+        if plain is None or blank is None:
+            continue
+        shapes = smooth_discrepancy(part, plain)
         # What the process explains is not repeatability.
-        calm = estimate_scatter(trained["base"], part, shapes)
-        process = fit_discrepancy(trained["base"], part, shapes, calm)
+        calm = estimate_scatter(plain, part, shapes)
+        process = fit_discrepancy(plain, part, shapes, calm)
         # The same noise for all three, so that their differences are not of the draws.
         seeds = rng.integers(2**32, size=held.size)
         for name in MODELS:
@@ -141,7 +145,8 @@ def _score(
             if predicted is None:
                 continue
             if name == "gaussian_process":
-                predicted = _corrected(layouts, base, held, predicted, process, calm)
+                places = [layouts[i] for i in held]
+                predicted = _corrected(places, blank, predicted, process, calm)
             for i, prediction, seed in zip(held, predicted, seeds, strict=True):
                 own = np.random.default_rng(seed)
                 for key, value in _judge(layouts[i], base, i, prediction, quantities, own).items():
@@ -149,15 +154,43 @@ def _score(
     return scored
 
 
+def _of_tests(whole: Fit, chosen: NDArray[np.int64]) -> Fit:
+    """Return what a fit says of some of its tests."""
+    return replace(
+        whole,
+        scores=Scores(whole.scores.shared, tuple(whole.scores.own[i] for i in chosen)),
+        slopes=Slopes(
+            tuple(whole.slopes.doubtful[i] for i in chosen),
+            tuple(whole.slopes.shared[i] for i in chosen),
+        ),
+        observations=tuple(whole.observations[i] for i in chosen),
+        residuals=tuple(whole.residuals[i] for i in chosen),
+        own_slopes=tuple(whole.own_slopes[i] for i in chosen),
+    )
+
+
 def _train(problem: Problem, layouts: Sequence[Layout], whole: Fit, kept: NDArray[np.int64]) -> Fit:
     """Return a fit to some of the tests, from that to all."""
     part = replace(problem, tests=tuple(problem.tests[i] for i in kept))
-    slopes = Slopes(
-        tuple(whole.slopes.doubtful[i] for i in kept), tuple(whole.slopes.shared[i] for i in kept)
-    )
-    scores = Scores(whole.scores.shared, tuple(whole.scores.own[i] for i in kept))
+    known = _of_tests(whole, kept)
     places = [layouts[i] for i in kept]
-    return fit(part, places, whole.forms, scores, whole.scatter, slopes, exact=False)
+    return fit(part, places, whole.forms, known.scores, whole.scatter, known.slopes, exact=False)
+
+
+def _untouched(problem: Problem, places: Sequence[Layout], fitted: Fit) -> Fit | None:
+    """Return a fit with its tests' own nuisances at zero; None if a run fails.
+
+    Where a model is far off they are far away: what they take up must not be extrapolated.
+    """
+    scores = Scores(fitted.scores.shared, tuple(np.zeros(len(place.names)) for place in places))
+    seen = observe_tests(problem, fitted.forms, places, scores)
+    if seen is None:
+        return None
+    residuals, own = expand_tests(places, seen, scores, fitted.slopes, fitted.scatter)
+    return replace(
+        fitted, scores=scores, observations=tuple(seen),
+        residuals=tuple(residuals), own_slopes=tuple(own),
+    )  # fmt: skip
 
 
 def _predict(
@@ -184,26 +217,28 @@ def _predict(
 
 
 def _corrected(
-    layouts: Sequence[Layout],
-    base: Fit,
-    held: NDArray[np.int64],
+    places: Sequence[Layout],
+    blank: Fit,
     predicted: Sequence[_Prediction],
     process: Discrepancy,
     calm: Scatter,
 ) -> list[_Prediction]:
-    """Return predictions with the Gaussian process added, and the repeatability beside it."""
-    places = [layouts[i] for i in held]
-    shapes = process.shapes_of(layouts, base)
+    """Return predictions with the Gaussian process added, and the repeatability beside it.
+
+    ``blank`` is the base model of the same tests, their own nuisances at zero.
+    """
+    shapes = process.shapes_of(places, blank)
     means, roots = process.predict(places)
     return [
         _Prediction(
-            prediction.mean + shapes[i] @ mean,
+            prediction.mean + shape @ mean,
             np.concatenate(
-                [prediction.factor * _calmed(layouts[i], base, prediction, calm), shapes[i] @ root],
-                axis=1,
+                [prediction.factor * _calmed(place, blank, prediction, calm), shape @ root], axis=1
             ),
         )
-        for i, prediction, mean, root in zip(held, predicted, means, roots, strict=True)
+        for place, shape, prediction, mean, root in zip(
+            places, shapes, predicted, means, roots, strict=True
+        )
     ]
 
 

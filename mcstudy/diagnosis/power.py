@@ -89,13 +89,21 @@ def _sized_form(cause: Cause) -> Form:
 
 
 def _crossing(values: Array, strengths: Array, none: float, needed: float) -> float:
-    """Return the value nearest to none at which the strength reaches what is needed."""
+    """Return the value nearest to none at which the strength reaches what is needed.
+
+    An effect that fades away from none, as a filter's class does towards the one stated, is
+    followed from where it is faintest.
+    """
     away = np.abs(values - none)
     # One side of none: the stronger effects of a prior about none are those above it.
     side = values > none if np.any(values > none) and np.any(values < none) else away > 0.0
     away, strengths, values = away[side], strengths[side], values[side]
     order = np.argsort(away)
     away, strengths, values = away[order], strengths[order], values[order]
+    faintest = int(np.argmin(strengths))
+    if strengths[faintest] < strengths[0]:
+        back = slice(faintest, None, -1)
+        away, strengths, values = away[back], strengths[back], values[back]
     reached = np.flatnonzero(strengths >= needed)
     if reached.size == 0:
         return float("nan")

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from mcstudy.figures import style
 from mcstudy.figures.panels import Band, Curve, Panel, draw_panels
@@ -93,7 +94,7 @@ def draw_evidence(effects: Sequence[Mapping[str, Any]]) -> Figure:
     # What makes the model worse is as far left as it can be seen.
     shown = list(effects)[:12]
     with style.styled():
-        figure = style.new_figure(7.0, 0.34 * len(shown) + 1.2)
+        figure = style.new_figure(7.0, 0.34 * max(len(shown), 3) + 1.2)
         axes = figure.subplots()
         values = [row["log_evidence"] for row in shown]
         colours = [style.RED if k == 0 or row["ambiguous"] else style.GREY
@@ -101,7 +102,8 @@ def draw_evidence(effects: Sequence[Mapping[str, Any]]) -> Figure:
         places = np.arange(len(shown))
         axes.barh(places, values, color=colours, height=0.65)
         axes.set_yticks(places, [row["name"].replace("_", " ") for row in shown])
-        axes.invert_yaxis()
+        # A bar alone is no broader than one of three.
+        axes.set_ylim(max(len(shown), 3) - 0.5, -0.5)
         axes.axvline(3.0, color="black", linestyle=":", linewidth=1.0)
         axes.set_xscale("symlog", linthresh=10.0)
         top = max(10.0, 2.0 * max(values))
@@ -134,6 +136,7 @@ def draw_gain(gains: Sequence[Mapping[str, Any]], labels: Mapping[str, str]) -> 
             axes.set_yticks(range(len(own)), [labels[g["score"]] for g in own])
             axes.invert_yaxis()
             axes.axvline(0.0, color="black", linewidth=0.8)
+            axes.xaxis.set_major_locator(MaxNLocator(5))
             axes.set(xlabel="better than the model as it stands [%]",
                      title=f"{region} the speeds used")  # fmt: skip
             axes.legend(fontsize=8, loc="best")

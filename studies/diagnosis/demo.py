@@ -112,7 +112,7 @@ def _sections(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list[S
         Section(
             "What had been hidden",
             [
-                f"A structure {1e3 * hidden['clearance']:.1f} mm below the hood, "
+                f"A structure {1e3 * hidden['clearance']:.2f} mm below the hood, "
                 f"{1e-3 * hidden['stiffness']:.0f} kN/m. The tests were made by another program "
                 "than the one that found it."
             ],

@@ -136,11 +136,17 @@ def _why(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> Section:
         rows,
     )
     lines = [
-        "Every cause of the catalogue was fitted with all uncertain inputs, in each of its forms. "
-        "Evidence is above that of the model as it stands, in natural log units, averaged over the "
-        "forms of a cause. Causes within 3 log units of the best cannot be told apart; below 3 log "
-        "units none is named."
+        "Every cause of the catalogue was tried over its prior, in each of its forms; those that "
+        "might win were fitted with all uncertain inputs. Evidence is above that of the model as "
+        "it stands, in natural log units, averaged over the forms of a cause. Causes within 3 log "
+        "units of the best cannot be told apart; below 3 log units none is named."
     ]
+    behind = [
+        n for n in analysis["titles"] if n not in {row["name"] for row in analysis["effects"]}
+    ]
+    if behind:
+        names = ", ".join(name.replace("_", " ") for name in behind)
+        lines.append(f"Far behind, or without a trace in what was measured: {names}.")
     left = analysis["remainder"]
     if left is not None:
         lines.append(

@@ -1,5 +1,6 @@
 """A diagnosis in plain words."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -50,8 +51,15 @@ def shown(row: Mapping[str, Any]) -> str:
     name, factor = _shown_unit(row.get("unit", "1"), float(row["value"]))
     value, low, high = (factor * float(row[key]) for key in ("value", "low", "high"))
     half = 0.5 * (high - low)
-    text = f"{number(value)} ± {number(half, 2)}" if half > 0.0 else number(value)
-    return f"{text} {unit(name)}".strip()
+    return f"{_with_error(value, half) if half > 0.0 else number(value)} {unit(name)}".strip()
+
+
+def _with_error(value: float, half: float) -> str:
+    """Return a value and its half-width, both to the second digit of the latter."""
+    digits = 1 - math.floor(math.log10(half))
+    if digits <= 0:
+        return f"{number(value)} ± {number(half, 2)}"
+    return f"{value:,.{digits}f} ± {half:.{digits}f}"
 
 
 def sentence(cause: str, parameters: Sequence[Mapping[str, Any]], title: str) -> str:

@@ -15,6 +15,7 @@ from mcstudy.config import MonteCarloStudy, load_study
 from mcstudy.errors import UserError
 from mcstudy.results import ResultsFolder
 from studies.api import run_study
+from studies.diagnosis import words
 from studies.diagnosis.study import diagnose
 from studies.validation.diagnosis.hidden_effects import Hidden, Laboratory, make_tests
 
@@ -255,3 +256,13 @@ def test_bad_data_exit_with_code_two(tmp_path: Path) -> None:
     done = run_command(str(tmp_path / "nowhere"))
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "text"),
+    [(0.0278569, 2.67e-5, "27.857 ± 0.027 mm"), (0.0278569, 4e-4, "27.86 ± 0.40 mm"),
+     (0.0278569, 0.012, "27.9 ± 12 mm")],
+)  # fmt: skip
+def test_a_parameter_is_as_exact_as_its_half_width(value: float, half: float, text: str) -> None:
+    row = {"unit": "m", "value": value, "low": value - half, "high": value + half}
+    assert words.shown(row) == text

@@ -52,12 +52,13 @@ _UNIT_TEXT = {"1": "", "m/s2": "m/s²", "rad/s2": "rad/s²"}
 
 def label(name: str, unit: str = "1") -> str:
     """Return an axis label: the quantity in words and its unit in square brackets."""
-    words = LABELS.get(name, name.replace("_", " "))
-    return f"{words} [{_UNIT_TEXT.get(unit, unit) or '–'}]"
+    return f"{words(name)} [{_UNIT_TEXT.get(unit, unit) or '–'}]"
 
 
 def words(name: str) -> str:
     """Return a quantity's name in words."""
+    if name.startswith("log_") and name not in LABELS:
+        return f"log of {words(name.removeprefix('log_'))}"
     return LABELS.get(name, name.replace("_", " "))
 
 

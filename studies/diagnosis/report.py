@@ -7,6 +7,7 @@ from mcstudy.figures import diagnosis as figures_of
 from mcstudy.figures import style
 from mcstudy.report import Section, Table
 from mcstudy.text import number
+from models.registry import load_model
 from studies.diagnosis import words
 
 SCORES = {
@@ -45,7 +46,8 @@ def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
             analysis["where"], labels, style.label(regime, unit) if regime else "tests"
         )
     if any(pictures["scalars"].values()):
-        names = {name: style.words(name) for name in pictures["scalars"]}
+        outputs = {item.name: item.unit for item in load_model(analysis["data"]["model"]).outputs}
+        names = {name: style.label(name, outputs.get(name, "1")) for name in pictures["scalars"]}
         figures["scalars"] = figures_of.draw_scalars(pictures["scalars"], names)
     if analysis["effects"]:
         figures["evidence"] = figures_of.draw_evidence(analysis["effects"])

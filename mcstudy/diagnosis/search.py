@@ -46,6 +46,8 @@ NOTABLE = 0.1
 """Share of the first cause's evidence that a second one must add where they leave structure."""
 FURTHER = 4.5
 """Standard errors from which a cause's template, after the first cause, is a second one's trace."""
+MOST_SECONDS = 2
+"""Second causes that may be alike: what more of them explain equally well is nobody's trace."""
 RIVAL = 0.5
 """Share of the best cause's evidence from which another one is tried as the first of two."""
 PAIRS = 2
@@ -272,7 +274,7 @@ def _best_pair(
             continue
         left = examine(problem, empty.layouts, empty.base, seconds[0].fitted)
         best = _Pair(first, seconds, left)
-    if best is None:
+    if best is None or len(_near(best.seconds)) > MOST_SECONDS:
         return None
     added, sole = best.seconds[0].log_evidence, best.first.log_evidence
     if best.remainder.p_value >= STRUCTURE:

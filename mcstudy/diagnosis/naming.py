@@ -274,7 +274,8 @@ def rank_causes(
                 cause,
                 fitted,
                 form,
-                float(special.logsumexp(evidence) - np.log(evidence.size)),
+                # Forms that were dropped on the way count: they have next to no evidence.
+                float(special.logsumexp(evidence) - np.log(len(cause.forms))),
                 {entry.name: float(v) for (entry, _), v in zip(own_fits, evidence, strict=True)},
             )
         )

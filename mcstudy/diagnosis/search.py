@@ -198,13 +198,14 @@ def _judge(
         return flagged
     tell(f"looking for a second cause beside {best.cause.name}")
     share = FAINT_SHARE if clean else SECOND_SHARE
-    pair = _best_pair(problem, causes, empty, candidates, share, workers)
-    if pair is not None:
+    found = _best_pair(problem, causes, empty, candidates, share, workers)
+    if found is not None:
+        pair, firsts = found
         explained = pair.remainder.p_value >= STRUCTURE
         return replace(
             alone,
             cause=pair.first.cause.name,
-            ambiguous=(),
+            ambiguous=firsts,
             remainder=pair.remainder,
             second=pair.seconds[0],
             second_ambiguous=_near(pair.seconds),
@@ -246,6 +247,16 @@ class _Pair:
     seconds: list[Candidate]
     remainder: Remainder
 
+    @property
+    def log_evidence(self) -> float:
+        """Evidence of both together, second causes' forms averaged."""
+        return self.first.fitted.log_evidence + self.seconds[0].log_evidence
+
+    @property
+    def second(self) -> str:
+        """Name of the second cause."""
+        return self.seconds[0].cause.name
+
 
 def _best_pair(
     problem: Problem,
@@ -254,30 +265,35 @@ def _best_pair(
     candidates: Sequence[Candidate],
     share: float,
     workers: int,
-) -> _Pair | None:
+) -> tuple[_Pair, tuple[str, ...]] | None:
     """Return the pair of causes that explains the misfit, if one does and no single one can.
 
-    ``share`` is that of the first cause's evidence that the second one must add.
+    With the first causes that do as well with the same second one, if there are any.
+
+    Parameters
+    ----------
+    share : of the first cause's evidence that the second one must add.
     """
-    best: _Pair | None = None
+    pairs: list[_Pair] = []
     for first in candidates[:PAIRS]:
         if first.log_evidence < RIVAL * candidates[0].log_evidence:
             continue
         seconds = rank_causes(problem, empty.layouts, first.fitted, causes, workers, SECONDS)
-        if not seconds:
-            continue
-        whole = first.fitted.log_evidence + seconds[0].log_evidence
-        if (
-            best is not None
-            and whole <= best.first.fitted.log_evidence + best.seconds[0].log_evidence
-        ):
-            continue
-        left = examine(problem, empty.layouts, empty.base, seconds[0].fitted)
-        best = _Pair(first, seconds, left)
-    if best is None or len(_near(best.seconds)) > MOST_SECONDS:
+        if seconds:
+            left = examine(problem, empty.layouts, empty.base, seconds[0].fitted)
+            pairs.append(_Pair(first, seconds, left))
+    if not pairs:
+        return None
+    best = max(pairs, key=lambda pair: pair.log_evidence)
+    if len(_near(best.seconds)) > MOST_SECONDS:
         return None
     added, sole = best.seconds[0].log_evidence, best.first.log_evidence
     if best.remainder.p_value >= STRUCTURE:
-        return best if added >= max(SECOND, share * sole) else None
-    most = best.remainder.share >= ALMOST_ALL and added >= NOTABLE * sole
-    return best if most else None
+        enough = added >= max(SECOND, share * sole)
+    else:
+        enough = best.remainder.share >= ALMOST_ALL and added >= NOTABLE * sole
+    if not enough:
+        return None
+    limit = best.log_evidence - DISTINCT
+    alike = [p for p in pairs if p.second == best.second and p.log_evidence > limit]
+    return best, tuple(p.first.cause.name for p in alike) if len(alike) > 1 else ()

@@ -44,6 +44,8 @@ FAINT_SHARE = 0.003
 """The same where the first cause alone leaves nothing that a general test would see."""
 NOTABLE = 0.1
 """Share of the first cause's evidence that a second one must add where they leave structure."""
+NEARLY_ALL = 0.99
+"""Share of the misfit that two causes which leave structure must explain together."""
 FURTHER = 4.5
 """Standard errors from which a cause's template, after the first cause, is a second one's trace."""
 MOST_SECONDS = 2
@@ -291,7 +293,7 @@ def _best_pair(
     if best.remainder.p_value >= STRUCTURE:
         enough = added >= max(SECOND, share * sole)
     else:
-        enough = best.remainder.share >= ALMOST_ALL and added >= NOTABLE * sole
+        enough = best.remainder.share >= NEARLY_ALL and added >= NOTABLE * sole
     if not enough:
         return None
     limit = best.log_evidence - DISTINCT

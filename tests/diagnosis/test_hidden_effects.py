@@ -95,7 +95,7 @@ def test_an_effect_of_the_catalogue_is_named(
 
 @pytest.mark.parametrize(
     "hidden",
-    [Hidden("ageing", "", {"loss": 0.01}), Hidden("cable", "", {"size": 4.0})],
+    [Hidden("ageing", "", {"loss": 0.01}), Hidden("cable", "", {"size": 0.8})],
     ids=lambda h: h.name,
 )
 def test_an_effect_outside_the_catalogue_is_not_named(

@@ -42,6 +42,7 @@ class Laboratory:
     ----------
     tests : number. slowest, fastest : m/s. mass : kg.
     speed_sd : m/s, of the recorded speed. noise_sd : g, after the filter.
+    force_sd : N, of the load cell. rebound_sd : m/s, of the rebound speed.
     scatter : relative, of the pulse from test to test. scale_sd : of the logarithm of the hood's
         unknown force scale. force, rebound : whether a load cell and a rebound speed were recorded.
     """
@@ -53,6 +54,8 @@ class Laboratory:
     ratio: float = 7.0
     speed_sd: float = 0.05
     noise_sd: float = 1.0
+    force_sd: float = 20.0
+    rebound_sd: float = 0.02
     scatter: float = 0.01
     scale_sd: float = 0.06
     force: bool = False
@@ -92,13 +95,15 @@ def make_tests(
         shown = _filtered(read, _class_of(hidden)) + rng.normal(0.0, lab.noise_sd, time.size)
         columns = {"time": _clock(hidden, time), "head_acceleration": shown}
         if lab.force:
-            columns["hood_force"] = _filtered(force * share, 1000.0) + rng.normal(0, 20, time.size)
+            columns["hood_force"] = _filtered(force * share, 1000.0) + rng.normal(
+                0.0, lab.force_sd, time.size
+            )
         name = f"t{k + 1:02d}"
         pd.DataFrame(columns).to_csv(folder / "signals" / f"{name}.csv", index=False)
         row = {"test": name, "impact_speed": _recorded(hidden, float(speed))
                + rng.normal(0.0, lab.speed_sd)}  # fmt: skip
         if lab.rebound:
-            row["rebound_speed"] = rebound + rng.normal(0.0, 0.02)
+            row["rebound_speed"] = rebound + rng.normal(0.0, lab.rebound_sd)
         rows.append(row)
     pd.DataFrame(rows).to_csv(folder / "tests.csv", index=False)
     (folder / "measured.toml").write_text(_header(header_of or lab), encoding="utf-8")
@@ -130,9 +135,9 @@ sd = {lab.noise_sd}
 filter = "CFC1000"
 """
     if lab.force:
-        text += '\n[signals.hood_force]\nunit = "N"\nsd = 20.0\nfilter = "CFC1000"\n'
+        text += f'\n[signals.hood_force]\nunit = "N"\nsd = {lab.force_sd}\nfilter = "CFC1000"\n'
     if lab.rebound:
-        text += '\n[scalars.rebound_speed]\nunit = "m/s"\nsd = 0.02\n'
+        text += f'\n[scalars.rebound_speed]\nunit = "m/s"\nsd = {lab.rebound_sd}\n'
     return text
 
 

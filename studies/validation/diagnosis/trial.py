@@ -90,7 +90,10 @@ def run_trial(trial: Trial, workers: int = 1) -> Outcome:
         start = time.perf_counter()
         finding = search(problem, causes_of("headform"), workers=workers)
         seconds = time.perf_counter() - start
-        sizes = [_size(Path(scratch) / h.name, h, trial.seed, laboratory, finding) for h in hidden]
+        sizes = [
+            _size(Path(scratch) / h.name, h, trial.seed, laboratory, problem, finding)
+            for h in hidden
+        ]
     return Outcome(
         trial=trial,
         hidden=tuple(f"{h.name} ({h.form or 'one form'})" for h in hidden),
@@ -114,27 +117,26 @@ def _problem(folder: Path) -> Problem:
 
 
 def _size(
-    scratch: Path, hidden: Hidden, seed: int, laboratory: Laboratory, finding: Finding
+    scratch: Path,
+    hidden: Hidden,
+    seed: int,
+    laboratory: Laboratory,
+    problem: Problem,
+    finding: Finding,
 ) -> float:
     """Return the size of an effect over the smallest that would be seen.
 
     Two sets of the same tests, one with the effect and one without, both without noise: their
     difference, all nuisances integrated out, in standard errors over those needed.
     """
-    quiet = replace(laboratory, noise_sd=0.0, scatter=0.0, speed_sd=0.0)
+    quiet = replace(
+        laboratory, noise_sd=0.0, force_sd=0.0, rebound_sd=0.0, scatter=0.0, speed_sd=0.0
+    )
+    found = {}
     for name, effects in (("with", [hidden]), ("without", [])):
-        make_tests(scratch / name, effects, seed, quiet, header_of=laboratory)
-    twin, plain = _problem(scratch / "with"), _problem(scratch / "without")
-    plain = replace(
-        plain,
-        tests=tuple(
-            replace(test, signals=tuple(
-                replace(s, sd=real.sd, correlation=0.0)
-                for s, real in zip(test.signals, layout.test.signals, strict=True)
-            ))
-            for test, layout in zip(plain.tests, finding.layouts, strict=True)
-        ),
-    )  # fmt: skip
+        make_tests(scratch / name, effects, seed, quiet)
+        found[name] = _as_measured(problem, scratch / name)
+    twin, plain = found["with"], found["without"]
     layouts, fitted = fit_base(plain)
     columns = [_difference(layout, i, twin, fitted)[:, None] for i, layout in enumerate(layouts)]
     # The repeatability that the real set was made with, not that of its noise-free twin.
@@ -143,6 +145,30 @@ def _size(
     reduced = marginal.reduce(marginal.measured(), scatter)
     strength = float(np.sqrt(reduced.information[0, 0]))
     return strength / (finding.screening.threshold + POWER)
+
+
+def _as_measured(problem: Problem, folder: Path) -> Problem:
+    """Return a problem with the values of another folder, as uncertain as they were."""
+    data = load_measured(folder)
+    tests = []
+    for test in problem.tests:
+        row = data.tests[data.tests["test"] == test.name]
+        signals = []
+        for signal in test.signals:
+            time, values = data.signal(
+                test.name, signal.name, data.header.signals[signal.name].unit
+            )
+            signals.append(replace(signal, time=time, values=values, correlation=0.0))
+        tests.append(
+            replace(
+                test,
+                inputs=dict(test.inputs)
+                | {name: float(row[name].iloc[0]) for name in test.doubtful},
+                signals=tuple(signals),
+                scalars=tuple(replace(s, value=float(row[s.name].iloc[0])) for s in test.scalars),
+            )
+        )
+    return replace(problem, tests=tuple(tests))
 
 
 def _difference(layout: Layout, row: int, twin: Problem, fitted: Fit) -> Array:

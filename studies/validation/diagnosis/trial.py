@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.fit import Fit
-from mcstudy.diagnosis.layout import Layout, Scatter
-from mcstudy.diagnosis.marginal import Marginal
+from mcstudy.diagnosis.fit import fit
+from mcstudy.diagnosis.layout import Scatter
+from mcstudy.diagnosis.naming import rescale
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.diagnosis.screening import POWER
 from mcstudy.diagnosis.search import UNEXPLAINED, Finding, fit_base, search
@@ -126,24 +126,23 @@ def _size(
 ) -> float:
     """Return the size of an effect over the smallest that would be seen.
 
-    Two sets of the same tests, one with the effect and one without, both without noise: their
-    difference, all nuisances integrated out, in standard errors over those needed.
+    The tests are made again without any noise, with the effect and without it. What the model as it
+    stands cannot take up of the effect, all uncertain values fitted anew, is the effect's strength
+    in standard errors; over those needed it is the size.
     """
     quiet = replace(
         laboratory, noise_sd=0.0, force_sd=0.0, rebound_sd=0.0, scatter=0.0, speed_sd=0.0
     )
-    found = {}
+    # The repeatability that the real set was made with, not that of its noise-free twins.
+    scatter = Scatter(laboratory.scatter, 0.5 * laboratory.scatter)
+    misfits = []
     for name, effects in (("with", [hidden]), ("without", [])):
         make_tests(scratch / name, effects, seed, quiet)
-        found[name] = _as_measured(problem, scratch / name)
-    twin, plain = found["with"], found["without"]
-    layouts, fitted = fit_base(plain)
-    columns = [_difference(layout, i, twin, fitted)[:, None] for i, layout in enumerate(layouts)]
-    # The repeatability that the real set was made with, not that of its noise-free twin.
-    marginal = Marginal(fitted, layouts, columns)
-    scatter = Scatter(laboratory.scatter, 0.5 * laboratory.scatter)
-    reduced = marginal.reduce(marginal.measured(), scatter)
-    strength = float(np.sqrt(reduced.information[0, 0]))
+        twin = _as_measured(problem, scratch / name)
+        layouts, fitted = fit_base(twin)
+        start = rescale(layouts, fitted, scatter)
+        misfits.append(fit(twin, layouts, (), start, scatter, fitted.slopes).misfit)
+    strength = float(np.sqrt(2.0 * max(misfits[0] - misfits[1], 0.0)))
     return strength / (finding.screening.threshold + POWER)
 
 
@@ -169,19 +168,3 @@ def _as_measured(problem: Problem, folder: Path) -> Problem:
             )
         )
     return replace(problem, tests=tuple(tests))
-
-
-def _difference(layout: Layout, row: int, twin: Problem, fitted: Fit) -> Array:
-    """Return the whitened change that an effect makes of one test."""
-    parts = []
-    for signal, other in zip(layout.test.signals, twin.tests[row].signals, strict=True):
-        change = np.interp(signal.time, other.time, other.values) - signal.values
-        parts.append(change / signal.sd)
-    for scalar, other_scalar in zip(layout.test.scalars, twin.tests[row].scalars, strict=True):
-        parts.append(np.array([(other_scalar.value - scalar.value) / scalar.sd]))
-    change = np.concatenate(parts)
-    # A wrong record shifts what is expected, not what is measured.
-    for k, (name, sd) in enumerate(layout.test.doubtful.items()):
-        shift = twin.tests[row].inputs[name] - layout.test.inputs[name]
-        change -= fitted.own_slopes[row][:, k] * shift / sd
-    return change

@@ -155,8 +155,7 @@ def survey(
     for centre in centres:
         without = solve(centre, centre.residuals, weight)[1]
         tried: list[tuple[float, Scores]] = []
-        # A threshold is easily stepped over.
-        for scores in score_grid(form, fine=weight < FAR or len(form.free) > 1):
+        for scores in score_grid(form, fine=weight < FAR):
             start = Scores(np.concatenate([centre.scores.shared, scores]), centre.scores.own)
             residuals = residuals_at(problem, layouts, (*forms, form), start, SURVEY)
             if residuals is None:

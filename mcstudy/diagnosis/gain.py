@@ -137,11 +137,8 @@ def _score(
         # The same noise for all three, so that their differences are not of the draws.
         seeds = rng.integers(2**32, size=held.size)
         for name in MODELS:
-            fitted = trained["base" if name == "gaussian_process" else name]
-            whole = (
-                base if name == "gaussian_process" else {"base": base, "extended": extended}[name]
-            )
-            predicted = _predict(problem, layouts, fitted, whole, held)
+            kind, whole = ("extended", extended) if name == "extended" else ("base", base)
+            predicted = _predict(problem, layouts, trained[kind], whole, held)
             if predicted is None:
                 continue
             if name == "gaussian_process":

@@ -202,13 +202,13 @@ def _judge(
     share = FAINT_SHARE if clean else SECOND_SHARE
     found = _best_pair(problem, causes, empty, candidates, share, workers)
     if found is not None:
-        pair, firsts = found
-        explained = pair.remainder.p_value >= STRUCTURE
+        pair, rest, firsts = found
+        explained = rest.p_value >= STRUCTURE
         return replace(
             alone,
             cause=pair.first.cause.name,
             ambiguous=firsts,
-            remainder=pair.remainder,
+            remainder=rest,
             second=pair.seconds[0],
             second_ambiguous=_near(pair.seconds),
             best=pair.seconds[0].fitted,
@@ -243,11 +243,10 @@ def _near(candidates: Sequence[Candidate]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class _Pair:
-    """Two causes together: the first, the second ones by evidence, what they leave."""
+    """Two causes together: the first, and the second ones by evidence."""
 
     first: Candidate
     seconds: list[Candidate]
-    remainder: Remainder
 
     @property
     def log_evidence(self) -> float:
@@ -267,10 +266,10 @@ def _best_pair(
     candidates: Sequence[Candidate],
     share: float,
     workers: int,
-) -> tuple[_Pair, tuple[str, ...]] | None:
+) -> tuple[_Pair, Remainder, tuple[str, ...]] | None:
     """Return the pair of causes that explains the misfit, if one does and no single one can.
 
-    With the first causes that do as well with the same second one, if there are any.
+    With what it leaves, and the first causes that do as well with the same second one, if any.
 
     Parameters
     ----------
@@ -282,20 +281,20 @@ def _best_pair(
             continue
         seconds = rank_causes(problem, empty.layouts, first.fitted, causes, workers, SECONDS)
         if seconds:
-            left = examine(problem, empty.layouts, empty.base, seconds[0].fitted)
-            pairs.append(_Pair(first, seconds, left))
+            pairs.append(_Pair(first, seconds))
     if not pairs:
         return None
     best = max(pairs, key=lambda pair: pair.log_evidence)
     if len(_near(best.seconds)) > MOST_SECONDS:
         return None
+    left = examine(problem, empty.layouts, empty.base, best.seconds[0].fitted)
     added, sole = best.seconds[0].log_evidence, best.first.log_evidence
-    if best.remainder.p_value >= STRUCTURE:
+    if left.p_value >= STRUCTURE:
         enough = added >= max(SECOND, share * sole)
     else:
-        enough = best.remainder.share >= NEARLY_ALL and added >= NOTABLE * sole
+        enough = left.share >= NEARLY_ALL and added >= NOTABLE * sole
     if not enough:
         return None
     limit = best.log_evidence - DISTINCT
     alike = [p for p in pairs if p.second == best.second and p.log_evidence > limit]
-    return best, tuple(p.first.cause.name for p in alike) if len(alike) > 1 else ()
+    return best, left, tuple(p.first.cause.name for p in alike) if len(alike) > 1 else ()

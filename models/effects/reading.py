@@ -55,8 +55,10 @@ def record_reading(
     # A corner above half the sampling rate leaves what was sampled as it is.
     if 0.0 < CUTOFF_FACTOR * reading.channel_class < 0.5 * sampling_rate:
         signal = filter_cfc(signal, sampling_rate, reading.channel_class)
-    columns = [retime(column, reading.clock, origin) for column in signal.T]
-    return Record(np.stack(columns, axis=1), reading.clock)
+    if reading.clock != 1.0:
+        columns = [retime(column, reading.clock, origin) for column in signal.T]
+        signal = np.stack(columns, axis=1)
+    return Record(signal, reading.clock)
 
 
 def retime(values: Array, clock: float, origin: int) -> Array:

@@ -4,6 +4,7 @@ The full tier is ``mcstudy validate --diagnosis``.
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -113,13 +114,13 @@ def test_nothing_hidden_nothing_named(tmp_path: Path, monkeypatch: pytest.Monkey
     assert outcome.size == 0.0
 
 
-def outcome_of(kind: str, names: tuple[str, ...], cause: str | None, **more: object) -> Outcome:
-    values: dict[str, object] = {
+def outcome_of(kind: str, names: tuple[str, ...], cause: str | None, **more: Any) -> Outcome:
+    values: dict[str, Any] = {
         "trial": Trial(1, kind, force=False), "hidden": names, "names": names, "size": 3.0,
         "p_value": 0.5 if cause is None else 0.001, "cause": cause, "ambiguous": (),
         "second": None, "second_ambiguous": (), "flagged": False, "why": "", "seconds": 1.0,
     }  # fmt: skip
-    return Outcome(**(values | more))  # type: ignore[arg-type]
+    return Outcome(**(values | more))
 
 
 def test_rates_count_what_they_say() -> None:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from studies.validation.diagnosis.hidden_effects import Hidden, Laboratory
+from studies.validation.diagnosis.hidden_effects import Hidden
 
 Draw = Callable[[np.random.Generator], Hidden]
 
@@ -72,7 +72,7 @@ OUTSIDE: list[Draw] = [
 KINDS = ("none", "catalogue", "other form", "outside", "pair")
 
 
-def draw(seed: int, kind: str, laboratory: Laboratory | None = None) -> list[Hidden]:
+def draw(seed: int, kind: str) -> list[Hidden]:
     """Return what is hidden in the set of a seed."""
     rng = np.random.default_rng([seed, 77])
     if kind == "none":

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from models.compilation import kernel
 from models.contact.law import KNOTS, contact_force, law_of
+from models.crash.ellipsoids import build_ellipsoids
+from models.crash.surfaces import empty_contacts, push, update_surfaces
 from models.multibody.integration import correct, predict
 from models.multibody.joints import apply_joint_torques
-from models.multibody.setup import build_ellipsoids, build_tree, place
-from models.multibody.surfaces import empty_contacts, push, update_surfaces
+from models.multibody.setup import build_tree, place
 from models.multibody.tree import empty_loads, solve_accelerations, update_kinematics
 from models.pedestrian.anthropometry import SEGMENTS, Body
 from models.pedestrian.joints import Joints

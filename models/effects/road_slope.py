@@ -3,8 +3,8 @@
 import math
 from collections.abc import Mapping
 
+from models.crash.road import Road
 from models.criteria.units import STANDARD_GRAVITY
-from models.multibody.road import Road
 
 
 def apply(road: Road, parameters: Mapping[str, float]) -> Road:

@@ -7,26 +7,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models import data
+from models.crash import outcome
+from models.crash.record import END_REASONS, R_ZONES, S_FRAMES, S_REASON, S_RECORDS, SUMMARY
+from models.crash.surfaces import CHANNELS, empty_contacts
 from models.declaration import read_inputs, read_outputs, run_rows
 from models.effects.chain import build_chain
 from models.effects.registry import effects_of
-from models.multibody import outcome
 from models.multibody.setup import Crash, build_crash
 from models.multibody.simulation import (
-    END_REASONS,
-    R_ZONES,
-    S_FRAMES,
-    S_REASON,
-    S_RECORDS,
     STABLE,
-    SUMMARY,
     Settings,
     damping_rate,
     empty_scratch,
     simulate,
     stable_ticks,
 )
-from models.multibody.surfaces import CHANNELS, empty_contacts
 from models.multibody.tree import empty_loads
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK, is_possible
 from models.protocol import OK, Batch, Input, Output, Run, complete_inputs
@@ -205,7 +200,8 @@ class MultibodyModel:
 
     def _step(self, crash: Crash, values: dict[str, float]) -> outcome.Raw:
         n, zones = len(SEGMENTS), len(self.vehicle.zones)
-        rate = damping_rate(crash.tree, crash.joints)
+        scenario = crash.scenario
+        rate = damping_rate(crash.tree, scenario.joints)
         # A light body with stiff joints takes a finer step than asked for.
         tick = self.tick / max(1, math.ceil(rate * self.tick / STABLE))
         record = self._record
@@ -223,13 +219,13 @@ class MultibodyModel:
         )
         work, head_contact, summary = np.zeros(CHANNELS), np.full(10, np.nan), np.zeros(SUMMARY)
         simulate(
-            crash.tree, crash.joints, crash.ellipsoids, crash.zones, crash.road,
-            crash.car_motion, settings,
-            crash.motion, empty_loads(n), empty_contacts(n, zones, len(crash.ellipsoids.pairs)),
+            crash.tree, scenario.joints, scenario.ellipsoids, scenario.zones, scenario.road,
+            scenario.car_motion, settings,
+            crash.motion, empty_loads(n), empty_contacts(n, zones, len(scenario.ellipsoids.pairs)),
             empty_scratch(n), work, record, self._frames, head_contact, summary,
         )  # fmt: skip
         return outcome.Raw(
-            crash=crash,
+            scenario=scenario,
             chain=self._chain,
             values=values,
             record=record[: int(summary[S_RECORDS])],

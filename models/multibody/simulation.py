@@ -7,11 +7,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.compilation import inlined_kernel, kernel
-from models.multibody.body_contact import apply_road_contacts, apply_self_contacts
-from models.multibody.car_contact import apply_car_contacts
+from models.crash.body_contact import apply_road_contacts, apply_self_contacts
+from models.crash.car_contact import apply_car_contacts
+from models.crash.record import (
+    NOT_FINITE,
+    R_ACCELERATION,
+    R_CENTRE,
+    R_HEAD_CAR,
+    R_HEAD_ROAD,
+    R_RELATIVE,
+    R_SPIN,
+    R_SPIN_RATE,
+    R_TIME,
+    R_ZONES,
+    REST,
+    REST_ON_CAR,
+    REST_SPEED,
+    REST_SPREAD,
+    REST_TIME,
+    S_CENTRE_SPEED,
+    S_ENERGY_END,
+    S_ENERGY_START,
+    S_FRAMES,
+    S_GROUND_TIME,
+    S_HEAD_DEPTH,
+    S_HEAD_ZONE,
+    S_REASON,
+    S_RECORDS,
+    S_STEPS,
+    S_TIME,
+    STEP_LIMIT,
+    TIME_LIMIT,
+)
+from models.crash.stepping import HEAD_FALL, HEAD_FORCE, head_meets_car
+from models.crash.surfaces import CHANNELS, update_surfaces
 from models.multibody.integration import correct, predict
 from models.multibody.joints import FRICTION_RATE, TWIST_FRICTION, apply_joint_torques
-from models.multibody.surfaces import CHANNELS, update_surfaces
 from models.multibody.tree import (
     Tree,
     centre_acceleration,
@@ -22,53 +53,6 @@ from models.pedestrian.joints import Joints
 from models.vehicle.motion import car_state
 
 Array = NDArray[np.float64]
-
-REST, REST_ON_CAR, TIME_LIMIT, STEP_LIMIT, NOT_FINITE = range(5)
-END_REASONS = ("rest_on_road", "rest_on_car", "time_limit", "step_limit", "not_finite")
-
-REST_SPEED = 0.05
-"""Speed (m/s) of the centre of gravity below which the body counts as at rest (assumed; at 0.6 g
-it would slide 0.2 mm further)."""
-REST_SPREAD = 0.3
-"""Root mean square segment speed (m/s) that a body at rest may still have (assumed)."""
-REST_TIME = 0.03
-"""Time (s) for which both must hold (assumed)."""
-
-HEAD_NEAR = 0.03
-"""Distance (m) from a car zone within which a closing head is stepped finely (assumed)."""
-HEAD_SPEED = 1.5
-"""Rearward speed (m/s) relative to the car at which a head near it counts as closing (assumed)."""
-HEAD_FALL = 0.3
-"""Downward speed (m/s) at which a head near car or road counts as closing (assumed)."""
-HEAD_FORCE = 300.0
-"""Head force (N) on car or road above which its contact is stepped finely (assumed)."""
-
-# Columns of the record.
-R_TIME = 0
-R_ACCELERATION = 1  # 3: head, specific force, world, m/s2
-R_SPIN = 4  # 3: head angular velocity, own axes, rad/s
-R_SPIN_RATE = 7  # 3: head angular acceleration, own axes, rad/s2
-R_RELATIVE = 10  # 3: head velocity relative to the car front, car axes, m/s
-R_HEAD_CAR = 13  # head contact force with the car, N
-R_HEAD_ROAD = 14
-R_CENTRE = 15  # 3: centre of gravity, m
-R_ZONES = 18  # z + 1: normal force by zone, last the road, N
-
-# Entries of the summary.
-(
-    S_REASON,
-    S_TIME,
-    S_STEPS,
-    S_RECORDS,
-    S_FRAMES,
-    S_GROUND_TIME,
-    S_ENERGY_START,
-    S_ENERGY_END,
-    S_HEAD_ZONE,
-    S_HEAD_DEPTH,
-    S_CENTRE_SPEED,
-) = range(11)
-SUMMARY = 11
 
 
 class Scratch(NamedTuple):
@@ -196,33 +180,16 @@ def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts):
     flight and otherwise.
     """
     head = settings.head
-    reach = ellipsoids.reach[head]
-    cosine, sine = math.cos(car[2]), math.sin(car[2])
-    wx, wy = contacts.centre[head, 0] - car[0], contacts.centre[head, 1] - car[1]
-    x, y = cosine * wx + sine * wy, abs(cosine * wy - sine * wx)
-    z = contacts.centre[head, 2]
-    ux = motion.velocity[head, 0] - car[3] + car[5] * wy
-    uy = motion.velocity[head, 1] - car[4] - car[5] * wx
+    if head_meets_car(head, ellipsoids, zones, car, motion, contacts):
+        return 1
     fall = -motion.velocity[head, 2]
-    # Closing on the car: downwards onto hood or windscreen, or rearwards into its front.
-    closing = fall > HEAD_FALL or cosine * ux + sine * uy < -HEAD_SPEED
-    for j in range(zones.radius.shape[0]):
-        if contacts.segment_force[head, j] > HEAD_FORCE:
-            return 1
-        if closing and (
-            x < zones.box[j, 1] + reach + HEAD_NEAR
-            and x > zones.box[j, 0] - reach - HEAD_NEAR
-            and z < zones.box[j, 3] + reach + HEAD_NEAR
-            and z > zones.box[j, 2] - reach - HEAD_NEAR
-            and y < zones.half_width[j] + reach + HEAD_NEAR
-        ):
-            return 1
     road = contacts.zone_force.shape[0] - 1
     ahead = 2.0 * settings.flight * settings.tick
     if contacts.segment_force[head, road] > HEAD_FORCE:
         return 1
     # The exact gap of the head as it lies.
-    if fall > HEAD_FALL and z - math.sqrt(contacts.shape[head, 5]) < ahead * fall + 1e-3:
+    gap = contacts.centre[head, 2] - math.sqrt(contacts.shape[head, 5])
+    if fall > HEAD_FALL and gap < ahead * fall + 1e-3:
         return 1
     for j in range(road + 1):
         if contacts.zone_force[j] > 0.0:

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from models.compilation import kernel
+from models.crash.record import S_STEPS
 from models.criteria import head_injury_criterion
 from models.multibody.integration import correct, predict
 from models.multibody.model import MultibodyModel
 from models.multibody.setup import build_crash, build_tree
-from models.multibody.simulation import S_STEPS, empty_scratch
+from models.multibody.simulation import empty_scratch
 from models.multibody.tree import (
     Tree,
     empty_loads,

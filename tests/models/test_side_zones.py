@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from models.contact.law import ForceCurve
-from models.multibody.car_contact import BORDER, ENTRY_DEPTH, apply_car_contacts, zone_separation
+from models.crash.car_contact import BORDER, ENTRY_DEPTH, apply_car_contacts, zone_separation
+from models.crash.scenario import Scenario, build_scenario
+from models.crash.surfaces import Contacts, empty_contacts
 from models.multibody.model import MultibodyModel
-from models.multibody.setup import Crash, build_crash
-from models.multibody.surfaces import Contacts, empty_contacts
+from models.multibody.setup import build_tree
 from models.multibody.tree import empty_loads, empty_motion
 from models.pedestrian.anthropometry import HEAD, SEGMENTS
 from models.pedestrian.tissue import build_tissue
@@ -41,24 +42,26 @@ class Front:
     """A car front and a child's head over it; the other segments are far ahead."""
 
     vehicle: Vehicle
-    crash: Crash
+    scenario: Scenario
 
     def row(self, zone: str) -> int:
         return self.vehicle.zone_index(zone)
 
     def contacts(self) -> Contacts:
-        crash = self.crash
-        found = empty_contacts(len(SEGMENTS), len(self.vehicle.zones), len(crash.ellipsoids.pairs))
+
+        found = empty_contacts(
+            len(SEGMENTS), len(self.vehicle.zones), len(self.scenario.ellipsoids.pairs)
+        )
         found.centre[:] = [9.0, 0.0, 9.0]
-        found.shape[:, [0, 3, 5]] = crash.ellipsoids.square
+        found.shape[:, [0, 3, 5]] = self.scenario.ellipsoids.square
         return found
 
     def centre(self, y: float, depth: float, along: float) -> Array:
         """Return where an upright head's centre is that is ``depth`` m in the hood at y."""
-        zones, hood = self.crash.zones, self.row("hood")
+        zones, hood = self.scenario.zones, self.row("hood")
         direction = zones.direction[hood]
         normal = np.array([-direction[1], direction[0]]) * np.sign(direction[0])
-        square = self.crash.ellipsoids.square[HEAD]
+        square = self.scenario.ellipsoids.square[HEAD]
         reach = math.sqrt(square[0] * normal[0] ** 2 + square[2] * normal[1] ** 2)
         x, z = (
             zones.origin[hood] + along * zones.length[hood] * direction + (reach - depth) * normal
@@ -66,9 +69,16 @@ class Front:
         return np.array([x - 0.5 * zones.curvature[hood] * y**2, y, z])
 
     def separation(self, zone: str, centre: Array) -> tuple[float, ...]:
-        crash = self.crash
+
         found = zone_separation(
-            crash.zones, crash.ellipsoids, self.contacts(), self.row(zone), HEAD, *centre, 1.0, 0.0
+            self.scenario.zones,
+            self.scenario.ellipsoids,
+            self.contacts(),
+            self.row(zone),
+            HEAD,
+            *centre,
+            1.0,
+            0.0,
         )
         return tuple(float(value) for value in found)
 
@@ -79,8 +89,8 @@ class Front:
         motion = empty_motion(len(SEGMENTS))
         motion.centre[:] = contacts.centre
         apply_car_contacts(
-            self.crash.zones, self.crash.ellipsoids, np.zeros(6), motion,
-            empty_loads(len(SEGMENTS)), contacts, self.crash.tree, np.zeros(7),
+            self.scenario.zones, self.scenario.ellipsoids, np.zeros(6), motion,
+            empty_loads(len(SEGMENTS)), contacts, build_tree(self.scenario.body), np.zeros(7),
         )  # fmt: skip
         force = contacts.segment_force[HEAD]
         return {zone.name: float(force[j]) for j, zone in enumerate(self.vehicle.zones)}
@@ -90,9 +100,8 @@ class Front:
 def front(name: str) -> Front:
     values = {item.name: item.nominal for item in MultibodyModel().inputs}
     vehicle = load_vehicle(name)
-    crash = build_crash(values | {"lateral_offset": 0.0}, vehicle)
-    assert crash is not None
-    return Front(vehicle, crash)
+    scenario = build_scenario(values | {"lateral_offset": 0.0}, vehicle)
+    return Front(vehicle, scenario)
 
 
 def in_series(one: ForceCurve, other: ForceCurve, depth: float) -> float:
@@ -116,7 +125,7 @@ def test_a_head_meets_the_curve_of_its_zone(name: str, sign: float, zone: str) -
     car = front(name)
     entry = car.vehicle.zones[car.row(zone)]
     middle = 0.5 * (entry.inner + entry.half_width) if entry.inner else 0.4 * entry.half_width
-    tissue = build_tissue(car.crash.body)["head"]
+    tissue = build_tissue(car.scenario.body)["head"]
     contacts = car.contacts()
     for depth in (0.005, 0.012, 0.025):
         centre = car.centre(sign * middle, depth, 0.5)
@@ -197,7 +206,9 @@ def test_a_deep_head_is_handed_from_hood_to_fender(way: str) -> None:
         ways = ways[::-1]
     for share in np.linspace(0.1, 1.0, 10):
         car.press(contacts, car.centre(ways[0], share * depth, 0.5))
-    softest = 0.9 * in_series(hood.corridor.curve(0.5), build_tissue(car.crash.body)["head"], depth)
+    softest = 0.9 * in_series(
+        hood.corridor.curve(0.5), build_tissue(car.scenario.body)["head"], depth
+    )
     for y in ways:
         assert sum(car.press(contacts, car.centre(float(y), depth, 0.5)).values()) > softest
 
@@ -210,7 +221,9 @@ def test_a_deep_head_is_handed_from_edge_to_hood(name: str) -> None:
     ways = np.linspace(-0.04, 0.10, 36) / hood.length
     for share in np.linspace(0.1, 1.0, 10):
         car.press(contacts, car.centre(0.0, share * depth, float(ways[0])))
-    softest = 0.9 * in_series(hood.corridor.curve(0.5), build_tissue(car.crash.body)["head"], depth)
+    softest = 0.9 * in_series(
+        hood.corridor.curve(0.5), build_tissue(car.scenario.body)["head"], depth
+    )
     forces = [car.press(contacts, car.centre(0.0, depth, float(along))) for along in ways]
     assert forces[0]["hood_edge"] > softest
     # Past the border the hood alone holds it.
@@ -245,7 +258,7 @@ def test_wrap_around_distance_does_not_ask_whose_point_it_is(name: str) -> None:
         point = entry.origin + share * entry.length * entry.direction
         assert wrap_around_distance(name, hood, point) == wrap_around_distance(name, side, point)
     for point in ([-0.5, 0.9], [-1.0, 0.8]):
-        found = [surface_point(car.crash.zones, row, np.array(point)) for row in (hood, side)]
+        found = [surface_point(car.scenario.zones, row, np.array(point)) for row in (hood, side)]
         np.testing.assert_array_equal(*found)
 
 

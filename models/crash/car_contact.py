@@ -9,7 +9,7 @@ import math
 from models.compilation import inlined_kernel
 from models.contact.friction import friction_coefficient
 from models.contact.geometry import roll_direction
-from models.multibody.surfaces import (
+from models.crash.surfaces import (
     CAR_NORMAL,
     CONTACT_DAMPING,
     FRICTION,

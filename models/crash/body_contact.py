@@ -5,7 +5,7 @@ import math
 from models.compilation import inlined_kernel
 from models.contact.friction import friction_coefficient
 from models.contact.geometry import ellipsoid_direction
-from models.multibody.surfaces import (
+from models.crash.surfaces import (
     CONTACT_DAMPING,
     FRICTION,
     ROAD_NORMAL,

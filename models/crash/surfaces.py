@@ -1,4 +1,4 @@
-"""Contact as loads on the tree: surfaces of the segments, state of the contacts, shared steps."""
+"""Contact as loads on the segments: state of the contacts, work channels, shared steps."""
 
 from typing import NamedTuple
 
@@ -32,32 +32,6 @@ WORK_CHANNELS = (
     "friction",
     "contact_damping",
 )
-
-
-class Ellipsoids(NamedTuple):
-    """Surfaces of ``n`` segments and their contact laws.
-
-    Attributes
-    ----------
-    square : (n, 3) m2, squared semi-axes. reach : (n,) m, largest semi-axis.
-    offset : (n, 3) m, ellipsoid centre from the centre of mass, own axes.
-    laws : (m, KNOTS, 4) combined laws, counts : (m,) their knots, damping : (m,) N s/m.
-    surface_law : (n, z + 1) law of a segment against a zone, last column the road.
-    pairs : (p, 3) first segment, second segment and law of the contacts between segments.
-    pair_gap : (p,) m, overlap of the undeformed ellipsoids that carries no force.
-    pair_friction : float.
-    """
-
-    square: Array
-    reach: Array
-    offset: Array
-    laws: Array
-    counts: Index
-    damping: Array
-    surface_law: Index
-    pairs: Index
-    pair_gap: Array
-    pair_friction: float
 
 
 class Contacts(NamedTuple):

@@ -9,19 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.contact.law import SURFACE, interpolate_law
-from models.criteria import (
-    brain_injury_criterion,
-    clip_level,
-    effective_mass,
-    filter_cfc,
-    head_injury_criterion,
-    impact_angle,
-)
-from models.criteria.units import STANDARD_GRAVITY
-from models.effects.chain import EffectChain
-from models.effects.reading import Reading, record_reading
-from models.multibody.setup import Crash
-from models.multibody.simulation import (
+from models.crash.record import (
     R_ACCELERATION,
     R_CENTRE,
     R_HEAD_CAR,
@@ -38,7 +26,19 @@ from models.multibody.simulation import (
     S_HEAD_ZONE,
     S_TIME,
 )
-from models.multibody.surfaces import WORK_CHANNELS
+from models.crash.scenario import Scenario
+from models.crash.surfaces import WORK_CHANNELS
+from models.criteria import (
+    brain_injury_criterion,
+    clip_level,
+    effective_mass,
+    filter_cfc,
+    head_injury_criterion,
+    impact_angle,
+)
+from models.criteria.units import STANDARD_GRAVITY
+from models.effects.chain import EffectChain
+from models.effects.reading import Reading, record_reading
 from models.pedestrian.anthropometry import HEAD, SEGMENTS
 from models.protocol import History, Scene, chosen_histories, history_of
 from models.vehicle.motion import stopping_distance
@@ -67,7 +67,7 @@ SHORTEST_PHASE = 40
 class Raw:
     """What the step loop leaves behind; see ``simulate`` for the arrays."""
 
-    crash: Crash
+    scenario: Scenario
     chain: EffectChain
     values: Mapping[str, float]
     record: Array
@@ -159,7 +159,7 @@ def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
         "ground_hic15": lambda: hic(road, 0.015) if landed else 0.0,
         "ground_time": lambda: float(raw.summary[S_GROUND_TIME if landed else S_TIME]),
         "crash_duration": lambda: float(raw.summary[S_TIME]),
-        "car_stopping_distance": lambda: stopping_distance(raw.crash.car_motion),
+        "car_stopping_distance": lambda: stopping_distance(raw.scenario.car_motion),
         "energy_residual": energy_residual,
         **_head_contact(raw, signals),
     }
@@ -171,12 +171,12 @@ def _head_contact(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
     zone = int(raw.summary[S_HEAD_ZONE])
     if not math.isfinite(contact[0]) or zone < 0:
         return {"head_impact_time": lambda: math.nan}
-    vehicle, laws = raw.crash.vehicle, raw.crash.ellipsoids
+    vehicle, laws = raw.scenario.vehicle, raw.scenario.ellipsoids
     law = int(laws.surface_law[HEAD, zone])
 
     def wad() -> float:
         dive = raw.chain.act("inputs", raw.values, raw.values)["dive_angle"]
-        surface = surface_point(raw.crash.zones, zone, contact[[7, 9]])
+        surface = surface_point(raw.scenario.zones, zone, contact[[7, 9]])
         return wrap_around_distance(vehicle.name, zone, static_point(vehicle, dive, surface))
 
     def mass() -> float:
@@ -217,7 +217,7 @@ def histories(
     def spin(k: int) -> Callable[[], Array]:
         return lambda: signals.spin[:, k]
 
-    zones = raw.crash.vehicle.zones
+    zones = raw.scenario.vehicle.zones
     sources: dict[str, dict[str, tuple[str, Callable[[], Array]]]] = {
         "head": {
             "acceleration": ("g", lambda: signals.acceleration),
@@ -249,7 +249,7 @@ def scene(raw: Raw) -> Scene:
     """Return the poses of the segments and the car's outlines."""
     frames, n = raw.frames, len(SEGMENTS)
     pose = frames[:, 4:].reshape(-1, n, 7)
-    zones = raw.crash.zones
+    zones = raw.scenario.zones
     outline = []
     for j in range(zones.radius.size):
         if zones.kind[j] == ROLL:
@@ -262,7 +262,7 @@ def scene(raw: Raw) -> Scene:
             )
     width = zones.half_width.max()
     y = np.linspace(-width, width, 41)
-    bumper = raw.crash.vehicle.zone_index("bumper")
+    bumper = raw.scenario.vehicle.zone_index("bumper")
     nose = -0.5 * zones.curvature[bumper] * y**2
     rear = np.full(2, zones.box[:, 0].min())
     plan = np.stack(
@@ -272,7 +272,7 @@ def scene(raw: Raw) -> Scene:
     return Scene(
         time=frames[:, 0].copy(),
         names=SEGMENTS,
-        semi_axes=np.sqrt(raw.crash.ellipsoids.square),
+        semi_axes=np.sqrt(raw.scenario.ellipsoids.square),
         centre=pose[:, :, :3].copy(),
         orientation=pose[:, :, 3:].copy(),
         car=frames[:, 1:4].copy(),

@@ -1,0 +1,103 @@
+"""A crash before it is simulated: who is struck, how they run, the car and how it brakes, the road.
+
+It is the same for every crash model, so that models differ by their method alone.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from models.contact.law import ForceCurve
+from models.crash.ellipsoids import Ellipsoids, build_ellipsoids
+from models.crash.road import Road
+from models.effects.chain import EffectChain
+from models.pedestrian.anthropometry import Body, build_body
+from models.pedestrian.joints import Joints, build_joints
+from models.pedestrian.posture import Posture, running_posture
+from models.pedestrian.tissue import build_tissue
+from models.vehicle.motion import CarMotion, braking_motion
+from models.vehicle.profile import Vehicle, build_zones
+from models.vehicle.zones import Zones
+
+HOOD = "hood"
+"""Zone whose forces ``hood_force_scale`` multiplies."""
+SEARCH_AHEAD = 1.5
+"""m ahead of the car from which the body is brought back until it touches."""
+SEARCH_BEHIND = -0.6
+"""m behind the car's foremost point where the search for a first contact gives up."""
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What a crash model is given.
+
+    Attributes
+    ----------
+    posture : when the car comes, the hips over the origin. lateral_offset : m, of the hips, to the
+        left of the car's centre line.
+    ellipsoids : with no gap between neighbours yet, which each model measures in its own geometry.
+    """
+
+    body: Body
+    vehicle: Vehicle
+    joints: Joints
+    ellipsoids: Ellipsoids
+    zones: Zones
+    road: Road
+    car_motion: CarMotion
+    posture: Posture
+    lateral_offset: float
+
+
+def build_scenario(
+    inputs: Mapping[str, float], vehicle: Vehicle, chain: EffectChain | None = None
+) -> Scenario:
+    """Return the scenario for one set of inputs.
+
+    Parameters
+    ----------
+    inputs : mapping
+        By name, in SI units; see ``data/multibody.toml``.
+    vehicle : Vehicle
+    chain : effects that are switched on.
+    """
+    chain = chain or EffectChain()
+    given = inputs
+    inputs = chain.act("inputs", given, given)
+    body = build_body(inputs["age"], inputs["stature"], inputs["body_mass"], inputs["head_mass"])
+    curves = [zone.corridor.curve(inputs[zone.coordinate]) for zone in vehicle.zones]
+    for k, zone in enumerate(vehicle.zones):
+        if zone.name == HOOD:
+            force = inputs["hood_force_scale"] * curves[k].force
+            curves[k] = chain.act("curve", replace(curves[k], force=force), given)
+    tissue: Mapping[str, ForceCurve] = chain.act("tissue", build_tissue(body), given)
+    road = chain.act("road", Road(inputs["friction_body_road"]), given)
+    posture = running_posture(
+        body,
+        gait_phase=inputs["gait_phase"],
+        facing_angle=inputs["facing_angle"],
+        running_speed=inputs["running_speed"],
+        braced=chain.act("posture", 0.0, given),
+    )
+    return Scenario(
+        body=body,
+        vehicle=vehicle,
+        joints=build_joints(
+            body, neck_stiffness=inputs["neck_stiffness"], muscle_tone=inputs["muscle_tone"]
+        ),
+        ellipsoids=build_ellipsoids(body, tissue, curves, road.returned),
+        zones=build_zones(vehicle, inputs["dive_angle"], inputs["friction_body_car"]),
+        road=road,
+        car_motion=chain.act(
+            "braking",
+            braking_motion(
+                inputs["impact_speed"],
+                inputs["friction_tyre_road"],
+                inputs["yaw_rate"],
+                vehicle.rotation_centre,
+                road.pull,
+            ),
+            given,
+        ),
+        posture=posture,
+        lateral_offset=inputs["lateral_offset"],
+    )

@@ -28,6 +28,8 @@ class Input:
         Nominal value and valid range.
     source : str
         Where the nominal value comes from, with its label.
+    ignored : str
+        Why the model takes the input and makes nothing of it; empty if it does.
     """
 
     name: str
@@ -37,6 +39,7 @@ class Input:
     low: float
     high: float
     source: str = ""
+    ignored: str = ""
 
 
 @dataclass(frozen=True)

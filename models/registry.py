@@ -10,6 +10,7 @@ from models.protocol import Model
 _MODELS = {
     "headform": ("models.headform.model", "HeadformModel"),
     "multibody": ("models.multibody.model", "MultibodyModel"),
+    "planar": ("models.planar.model", "PlanarModel"),
 }
 
 

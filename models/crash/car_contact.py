@@ -138,8 +138,8 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
         reach = ellipsoids.reach[i]
         for j in range(count):
             contacts.segment_force[i, j] = 0.0
-        if cx > reach:
-            # Ahead of the foremost point, x = 0.
+        if cx > reach or ellipsoids.surface_law[i, 0] < 0:
+            # Ahead of the foremost point, x = 0, or free of the car.
             for j in range(count):
                 contacts.engaged[i, j] = False
             continue

@@ -25,7 +25,8 @@ class Ellipsoids(NamedTuple):
     square : (n, 3) m2, squared semi-axes. reach : (n,) m, largest semi-axis.
     offset : (n, 3) m, ellipsoid centre from the centre of mass, own axes.
     laws : (m, KNOTS, 4) combined laws, counts : (m,) their knots, damping : (m,) N s/m.
-    surface_law : (n, z + 1) law of a segment against a zone, last column the road.
+    surface_law : (n, z + 1) law of a segment against a zone, -1 where they pass through each other;
+        last column the road.
     pairs : (p, 3) first segment, second segment and law of the contacts between segments.
     pair_gap : (p,) m, overlap of the undeformed ellipsoids that carries no force.
     pair_friction : float.

@@ -65,7 +65,17 @@ SHORTEST_PHASE = 40
 
 @dataclass(frozen=True)
 class Raw:
-    """What the step loop leaves behind; see ``simulate`` for the arrays."""
+    """What the step loop leaves behind; see ``models.multibody.simulation`` for the arrays.
+
+    Road forces in the record may be NaN, and ``work`` empty, where a model does not have them.
+
+    Attributes
+    ----------
+    primary_end : s, when the impact on the car is over and that on the road begins, infinite if
+        the body never lands.
+    rigid_road : whether blows on the road have no limit as the step shrinks: the head's signals end
+        before them.
+    """
 
     scenario: Scenario
     chain: EffectChain
@@ -75,6 +85,8 @@ class Raw:
     work: Array
     head_contact: Array
     summary: Array
+    primary_end: float
+    rigid_road: bool = False
 
 
 class Signals:
@@ -83,21 +95,24 @@ class Signals:
     Attributes
     ----------
     time : (n,) s. split : sample at which the primary phase ends.
+    head_time : (k,) s, of the head's signals, which a rigid road ends with the primary phase.
     """
 
     def __init__(self, raw: Raw) -> None:
         self._raw = raw
         end = raw.record[-1, R_TIME]
         self.time: Array = np.arange(int(end * SAMPLING_RATE) + 1) / SAMPLING_RATE
-        ground = raw.summary[S_GROUND_TIME]
-        split = self.time.size if math.isinf(ground) else int(np.searchsorted(self.time, ground))
+        road = raw.primary_end
+        split = self.time.size if math.isinf(road) else int(np.searchsorted(self.time, road))
         self.split = max(split, min(SHORTEST_PHASE, self.time.size))
+        self.head_time = self.time[: self.split] if raw.rigid_road else self.time
 
-    def sampled(self, first: int, columns: int) -> Array:
-        """Return columns (n, columns) of the record on the grid."""
+    def sampled(self, first: int, columns: int, time: Array | None = None) -> Array:
+        """Return columns (n, columns) of the record on the grid, or at the given times."""
         record = self._raw.record
+        grid = self.time if time is None else time
         return np.stack(
-            [np.interp(self.time, record[:, R_TIME], record[:, first + k]) for k in range(columns)],
+            [np.interp(grid, record[:, R_TIME], record[:, first + k]) for k in range(columns)],
             axis=1,
         )
 
@@ -105,19 +120,23 @@ class Signals:
     def acceleration(self) -> Array:
         """Resultant acceleration (n,) in g."""
         raw = self._raw
-        felt = Reading(self.sampled(R_ACCELERATION, 3) / STANDARD_GRAVITY, LINEAR_CLASS)
+        felt = Reading(
+            self.sampled(R_ACCELERATION, 3, self.head_time) / STANDARD_GRAVITY, LINEAR_CLASS
+        )
         read = record_reading(raw.chain, raw.values, felt, SAMPLING_RATE, origin=0)
         return np.asarray(np.linalg.norm(read.acceleration, axis=1))
 
     @functools.cached_property
     def spin(self) -> Array:
         """Angular velocity (n, 3) in rad/s, own axes."""
-        return filter_cfc(self.sampled(R_SPIN, 3), SAMPLING_RATE, ANGULAR_CLASS)
+        return filter_cfc(self.sampled(R_SPIN, 3, self.head_time), SAMPLING_RATE, ANGULAR_CLASS)
 
     @functools.cached_property
     def spin_rate(self) -> Array:
         """Angular acceleration (n, 3) in rad/s2, own axes."""
-        return filter_cfc(self.sampled(R_SPIN_RATE, 3), SAMPLING_RATE, ANGULAR_CLASS)
+        return filter_cfc(
+            self.sampled(R_SPIN_RATE, 3, self.head_time), SAMPLING_RATE, ANGULAR_CLASS
+        )
 
 
 def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
@@ -136,6 +155,11 @@ def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
     def throw() -> float:
         path = record[-1, R_CENTRE : R_CENTRE + 2] - record[0, R_CENTRE : R_CENTRE + 2]
         return float(np.hypot(*path))
+
+    def ground_time() -> float:
+        # A body may come to rest on its limbs, or on the car.
+        touched = landed and math.isfinite(raw.summary[S_GROUND_TIME])
+        return float(raw.summary[S_GROUND_TIME if touched else S_TIME])
 
     def energy_residual() -> float:
         gained = raw.summary[S_ENERGY_END] - raw.summary[S_ENERGY_START]
@@ -157,7 +181,7 @@ def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
             (np.diff(record[:, R_CENTRE]) / np.diff(record[:, R_TIME])).max()
         ),
         "ground_hic15": lambda: hic(road, 0.015) if landed else 0.0,
-        "ground_time": lambda: float(raw.summary[S_GROUND_TIME if landed else S_TIME]),
+        "ground_time": ground_time,
         "crash_duration": lambda: float(raw.summary[S_TIME]),
         "car_stopping_distance": lambda: stopping_distance(raw.scenario.car_motion),
         "energy_residual": energy_residual,
@@ -208,38 +232,39 @@ def histories(
     Or only the channels ``<group>_<channel>`` that are wanted.
     """
 
-    def column(k: int) -> Callable[[], Array]:
-        return lambda: signals.sampled(k, 1)[:, 0]
-
-    def resultant(first: int) -> Callable[[], Array]:
-        return lambda: np.asarray(np.linalg.norm(signals.sampled(first, 3), axis=1))
+    def column(k: int, time: Array) -> Callable[[], Array]:
+        return lambda: signals.sampled(k, 1, time)[:, 0]
 
     def spin(k: int) -> Callable[[], Array]:
         return lambda: signals.spin[:, k]
 
-    zones = raw.scenario.vehicle.zones
-    sources: dict[str, dict[str, tuple[str, Callable[[], Array]]]] = {
-        "head": {
-            "acceleration": ("g", lambda: signals.acceleration),
-            "angular_velocity": ("rad/s", lambda: np.linalg.norm(signals.spin, axis=1)),
-            **{f"angular_velocity_{axis}": ("rad/s", spin(k)) for k, axis in enumerate("xyz")},
-            "angular_acceleration": ("rad/s2", lambda: np.linalg.norm(signals.spin_rate, axis=1)),
-            "velocity_relative_to_car": ("m/s", resultant(R_RELATIVE)),
-            **{
-                f"velocity_relative_to_car_{axis}": ("m/s", column(R_RELATIVE + k))
-                for k, axis in enumerate("xyz")
-            },
-            "car_force": ("N", column(R_HEAD_CAR)),
-            "road_force": ("N", column(R_HEAD_ROAD)),
+    zones, head = raw.scenario.vehicle.zones, signals.head_time
+    head_channels: dict[str, tuple[str, Callable[[], Array]]] = {
+        "acceleration": ("g", lambda: signals.acceleration),
+        "angular_velocity": ("rad/s", lambda: np.linalg.norm(signals.spin, axis=1)),
+        **{f"angular_velocity_{axis}": ("rad/s", spin(k)) for k, axis in enumerate("xyz")},
+        "angular_acceleration": ("rad/s2", lambda: np.linalg.norm(signals.spin_rate, axis=1)),
+        "velocity_relative_to_car": (
+            "m/s",
+            lambda: np.asarray(np.linalg.norm(signals.sampled(R_RELATIVE, 3, head), axis=1)),
+        ),
+        **{
+            f"velocity_relative_to_car_{axis}": ("m/s", column(R_RELATIVE + k, head))
+            for k, axis in enumerate("xyz")
         },
-        "contact_force": {
-            **{zone.name: ("N", column(R_ZONES + j)) for j, zone in enumerate(zones)},
-            "road": ("N", column(R_ZONES + len(zones))),
-        },
-        "centre_of_gravity": {axis: ("m", column(R_CENTRE + k)) for k, axis in enumerate("xyz")},
+        "car_force": ("N", column(R_HEAD_CAR, head)),
     }
-    found = chosen_histories(signals.time, sources, wanted)
-    if wanted is None:
+    contact_channels = {
+        zone.name: ("N", column(R_ZONES + j, signals.time)) for j, zone in enumerate(zones)
+    }
+    if not raw.rigid_road:
+        head_channels["road_force"] = ("N", column(R_HEAD_ROAD, head))
+        contact_channels["road"] = ("N", column(R_ZONES + len(zones), signals.time))
+    centre = {axis: ("m", column(R_CENTRE + k, signals.time)) for k, axis in enumerate("xyz")}
+    found = chosen_histories(head, {"head": head_channels}, wanted) | chosen_histories(
+        signals.time, {"contact_force": contact_channels, "centre_of_gravity": centre}, wanted
+    )
+    if wanted is None and raw.work.size:
         work = {name: (np.array([raw.work[k]]), "J") for k, name in enumerate(WORK_CHANNELS)}
         found["work"] = history_of(np.array([raw.summary[S_TIME]]), work)
     return found

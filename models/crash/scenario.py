@@ -20,10 +20,6 @@ from models.vehicle.zones import Zones
 
 HOOD = "hood"
 """Zone whose forces ``hood_force_scale`` multiplies."""
-SEARCH_AHEAD = 1.5
-"""m ahead of the car from which the body is brought back until it touches."""
-SEARCH_BEHIND = -0.6
-"""m behind the car's foremost point where the search for a first contact gives up."""
 
 
 @dataclass(frozen=True)

@@ -19,12 +19,10 @@ import math
 import numpy as np
 
 from models.compilation import inlined_kernel
+from models.pedestrian.joints import TWIST_FRICTION
 
 FRICTION_RATE = 3.0
 """Relative angular velocity (rad/s) at which joint friction reaches 71 % of its bound (assumed)."""
-TWIST_FRICTION = 0.1
-"""Friction about the twist axis over that about the others: a limb's weight, for which the bound is
-set, has no lever about its own length (assumed)."""
 
 
 DEGREE = 11

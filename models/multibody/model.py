@@ -1,19 +1,18 @@
 """The multibody crash model behind the model protocol."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from models import data
 from models.crash import outcome
-from models.crash.record import END_REASONS, R_ZONES, S_FRAMES, S_REASON, S_RECORDS, SUMMARY
+from models.crash.model import FRAME_INTERVAL, TIME_LIMIT, CrashModel
+from models.crash.record import R_ZONES, S_FRAMES, S_GROUND_TIME, S_RECORDS, SUMMARY
 from models.crash.surfaces import CHANNELS, empty_contacts
-from models.declaration import read_inputs, read_outputs, run_rows
-from models.effects.chain import build_chain
+from models.declaration import read_inputs, read_outputs
 from models.effects.registry import effects_of
-from models.multibody.setup import Crash, build_crash
+from models.multibody.setup import build_crash
 from models.multibody.simulation import (
     STABLE,
     Settings,
@@ -23,53 +22,27 @@ from models.multibody.simulation import (
     stable_ticks,
 )
 from models.multibody.tree import empty_loads
-from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK, is_possible
-from models.protocol import OK, Batch, Input, Output, Run, complete_inputs
-from models.vehicle.profile import Vehicle, load_vehicle
-
-Array = NDArray[np.float64]
+from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
 
 TICK = 1e-4
 """Default finest step (s): HIC15 is within 0.2 % of its value at a quarter of it."""
 COARSE, FLIGHT = 3, 6
 """Ticks a step in quiet contact and in free flight."""
-TIME_LIMIT = 12.0
-"""s of crash after which a run counts as failed."""
-FRAME_INTERVAL = 2e-3
-"""s between frames of a scene."""
-
-NO_CONTACT = "no_contact"
-NO_HEAD_CONTACT = "no_head_contact"
-IMPOSSIBLE_BODY = "impossible_body"
-
 
 _TABLE = data.load("multibody.toml")
-_INPUTS = read_inputs(_TABLE)
-_OUTPUTS = read_outputs(_TABLE)
 
 
-class MultibodyModel:
+class MultibodyModel(CrashModel):
     """Fifteen ellipsoid segments with spherical joints against a braking car.
 
-    Parameters
-    ----------
-    vehicle : str
-        Name of a vehicle of the data folder.
-    tick : float
-        Finest step in s.
-    effects : mapping, optional
-        By effect of the catalogue the values of its parameters; those left out take the median of
-        their prior.
-
-    Raises
-    ------
-    ValueError
-        If the vehicle or an effect is unknown or the step is not within 1 us to 0.2 ms.
+    See ``CrashModel`` for its parameters.
     """
 
     name = "multibody"
+    version = str(_TABLE["version"])
+    outputs = read_outputs(_TABLE)
     effects: tuple[str, ...] = effects_of("multibody")
-    partial_status = frozenset({NO_HEAD_CONTACT})
+    _own_inputs = read_inputs(_TABLE)
 
     def __init__(
         self,
@@ -77,128 +50,15 @@ class MultibodyModel:
         tick: float = TICK,
         effects: Mapping[str, Mapping[str, float]] | None = None,
     ) -> None:
-        if not 1e-6 <= float(tick) <= 2e-4:
-            raise ValueError(f"tick must lie within 1e-6 and 2e-4 s, given {tick}")
-        self.vehicle: Vehicle = load_vehicle(vehicle)
-        self.tick = float(tick)
-        self._chain = build_chain(self.name, effects)
+        super().__init__(vehicle, tick, effects)
         n, zones = len(SEGMENTS), len(self.vehicle.zones)
         self._record = np.empty((int(TIME_LIMIT / self.tick) + 2, R_ZONES + zones + 1))
         self._frames = np.empty((int(TIME_LIMIT / FRAME_INTERVAL) + 2, 4 + 7 * n))
 
-    @property
-    def version(self) -> str:
-        """Version of the model's data and equations."""
-        return str(_TABLE["version"])
-
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        """Inputs in order."""
-        return _INPUTS + self._chain.inputs
-
-    @property
-    def outputs(self) -> tuple[Output, ...]:
-        """Outputs in order."""
-        return _OUTPUTS
-
-    def run(self, inputs: Mapping[str, float]) -> Run:
-        """Run once, with time histories and scene.
-
-        Raises
-        ------
-        ValueError
-            If an input is unknown or outside its range.
-        """
-        return self._run(complete_inputs(self, inputs), None, None, scene=True)
-
-    def observe(
-        self,
-        inputs: Mapping[str, float],
-        channels: Collection[str],
-        outputs: Collection[str] = (),
-    ) -> Run:
-        """Run once for what a test records: only the channels and outputs that are named.
-
-        Parameters
-        ----------
-        inputs : by name. channels : ``<group>_<channel>``, e.g. ``head_acceleration``.
-        outputs : by name.
-
-        Raises
-        ------
-        ValueError
-            If an input is unknown or outside its range.
-        """
-        return self._run(complete_inputs(self, inputs), outputs, channels, scene=False)
-
-    def _run(
-        self,
-        values: dict[str, float],
-        outputs: Collection[str] | None,
-        channels: Collection[str] | None,
-        *,
-        scene: bool,
-    ) -> Run:
-        raw = self._simulate(values)
-        if isinstance(raw, str):
-            return Run(values, raw, raw, self._empty(outputs))
-        signals = outcome.Signals(raw)
-        status, measured = self._judge(raw, signals, outputs)
-        reason = END_REASONS[int(raw.summary[S_REASON])]
-        histories = outcome.histories(raw, signals, channels)
-        return Run(
-            values, status, reason, measured, histories, outcome.scene(raw) if scene else None
-        )
-
-    def run_batch(self, rows: Array) -> Batch:
-        """Run rows of inputs.
-
-        Parameters
-        ----------
-        rows : (n, inputs) in the order of ``inputs``, SI units.
-
-        Raises
-        ------
-        ValueError
-            If the array has another number of columns or a value outside its range.
-        """
-        return run_rows(self, rows, self._row)
-
-    def _row(self, values: dict[str, float]) -> tuple[str, dict[str, float]]:
-        """Return status and outputs of one run."""
-        raw = self._simulate(values)
-        if isinstance(raw, str):
-            return raw, self._empty()
-        return self._judge(raw, outcome.Signals(raw))
-
-    def _empty(self, wanted: Collection[str] | None = None) -> dict[str, float]:
-        names = (item.name for item in self.outputs if wanted is None or item.name in wanted)
-        return dict.fromkeys(names, math.nan)
-
-    def _judge(
-        self, raw: outcome.Raw, signals: outcome.Signals, wanted: Collection[str] | None = None
-    ) -> tuple[str, dict[str, float]]:
-        """Return the status of a run and its outputs, or those that are wanted."""
-        outputs = self._empty(wanted)
-        reason = END_REASONS[int(raw.summary[S_REASON])]
-        if not reason.startswith("rest"):
-            return reason, outputs
-        measures = outcome.measures(raw, signals)
-        outputs |= {name: measures[name]() for name in outputs if name in measures}
-        if math.isnan(measures["head_impact_time"]()):
-            return NO_HEAD_CONTACT, outputs
-        if not all(math.isfinite(value) for value in outputs.values()):
-            return "not_finite", self._empty(wanted)
-        return OK, outputs
-
-    def _simulate(self, values: dict[str, float]) -> outcome.Raw | str:
-        """Return what the step loop leaves behind, or the status that keeps it from starting."""
-        if not is_possible(values["stature"], values["body_mass"], values["head_mass"]):
-            return IMPOSSIBLE_BODY
+    def _step(self, values: dict[str, float]) -> outcome.Raw | None:
         crash = build_crash(values, self.vehicle, self._chain)
-        return NO_CONTACT if crash is None else self._step(crash, values)
-
-    def _step(self, crash: Crash, values: dict[str, float]) -> outcome.Raw:
+        if crash is None:
+            return None
         n, zones = len(SEGMENTS), len(self.vehicle.zones)
         scenario = crash.scenario
         rate = damping_rate(crash.tree, scenario.joints)
@@ -233,4 +93,5 @@ class MultibodyModel:
             work=work,
             head_contact=head_contact,
             summary=summary,
+            primary_end=float(summary[S_GROUND_TIME]),
         )

@@ -4,20 +4,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from models.compilation import kernel
-from models.contact.geometry import ellipsoid_direction
-from models.crash.car_contact import zone_separation
-from models.crash.scenario import SEARCH_AHEAD, SEARCH_BEHIND, Scenario, build_scenario
-from models.crash.surfaces import empty_contacts, shape_of, update_surfaces
+from models.crash.first_contact import first_contact_shift, widen_gaps
+from models.crash.scenario import Scenario, build_scenario
+from models.crash.surfaces import empty_contacts, update_surfaces
 from models.effects.chain import EffectChain
 from models.multibody.tree import Motion, Tree, empty_motion, update_kinematics
 from models.pedestrian.anthropometry import PARENTS, SEGMENTS, Body
 from models.pedestrian.posture import Posture, standing_posture
 from models.vehicle.profile import Vehicle
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -58,53 +54,9 @@ def place(posture: Posture) -> Motion:
 
 
 @kernel
-def pair_separations(tree, ellipsoids, motion, contacts, out):
-    """Write the separation (m) of every self-contact pair."""
+def _update(tree, ellipsoids, motion, contacts):
     update_kinematics(tree, motion)
     update_surfaces(ellipsoids, motion, contacts)
-    for k in range(ellipsoids.pairs.shape[0]):
-        i, j = ellipsoids.pairs[k, 0], ellipsoids.pairs[k, 1]
-        _, _, _, out[k] = ellipsoid_direction(
-            contacts.centre[i, 0] - contacts.centre[j, 0],
-            contacts.centre[i, 1] - contacts.centre[j, 1],
-            contacts.centre[i, 2] - contacts.centre[j, 2],
-            shape_of(contacts, i),
-            shape_of(contacts, j),
-            0.0,
-            0.0,
-            0.0,
-        )
-
-
-@kernel
-def _touches(zones, ellipsoids, contacts, shift):
-    for i in range(ellipsoids.reach.shape[0]):
-        x, y, z = contacts.centre[i, 0] + shift, contacts.centre[i, 1], contacts.centre[i, 2]
-        for j in range(zones.radius.shape[0]):
-            found = zone_separation(zones, ellipsoids, contacts, j, i, x, y, z, 1.0, 0.0)
-            if found[0] < 0.0 and found[7] > 0.0:
-                return True
-    return False
-
-
-@kernel
-def first_contact_shift(tree, zones, ellipsoids, motion, contacts, ahead, behind):
-    """Return the shift in x (m) that makes the body just touch the car, or NaN."""
-    update_kinematics(tree, motion)
-    update_surfaces(ellipsoids, motion, contacts)
-    clear, step = ahead, 0.02
-    while not _touches(zones, ellipsoids, contacts, clear - step):
-        clear -= step
-        if clear < behind:
-            return np.nan
-    low, high = clear - step, clear
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        if _touches(zones, ellipsoids, contacts, middle):
-            low = middle
-        else:
-            high = middle
-    return high
 
 
 def build_crash(
@@ -124,15 +76,12 @@ def build_crash(
     tree = build_tree(scenario.body)
     motion = place(scenario.posture)
     scratch = empty_contacts(len(SEGMENTS), len(vehicle.zones), len(ellipsoids.pairs))
-    # Neighbouring ellipsoids overlap at rest; only what goes beyond that is contact.
     for state in (place(standing_posture(scenario.body)), motion):
-        separation = np.empty(len(ellipsoids.pairs))
-        pair_separations(tree, ellipsoids, state, scratch, separation)
-        np.maximum(ellipsoids.pair_gap, -separation, out=ellipsoids.pair_gap)
+        _update(tree, ellipsoids, state, scratch)
+        widen_gaps(ellipsoids, scratch)
     motion.root_position[1] += scenario.lateral_offset
-    shift = first_contact_shift(
-        tree, scenario.zones, ellipsoids, motion, scratch, SEARCH_AHEAD, SEARCH_BEHIND
-    )
+    _update(tree, ellipsoids, motion, scratch)
+    shift = first_contact_shift(scenario.zones, ellipsoids, scratch)
     if np.isnan(shift):
         return None
     motion.root_position[0] += shift

@@ -42,14 +42,14 @@ from models.crash.record import (
 from models.crash.stepping import HEAD_FALL, HEAD_FORCE, head_meets_car
 from models.crash.surfaces import CHANNELS, update_surfaces
 from models.multibody.integration import correct, predict
-from models.multibody.joints import FRICTION_RATE, TWIST_FRICTION, apply_joint_torques
+from models.multibody.joints import FRICTION_RATE, apply_joint_torques
 from models.multibody.tree import (
     Tree,
     centre_acceleration,
     solve_accelerations,
     update_kinematics,
 )
-from models.pedestrian.joints import Joints
+from models.pedestrian.joints import TWIST_FRICTION, Joints
 from models.vehicle.motion import car_state
 
 Array = NDArray[np.float64]

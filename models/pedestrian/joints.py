@@ -13,6 +13,9 @@ from models.rotation import axis_rotation, multiply
 Array = NDArray[np.float64]
 
 NECK_JOINTS = ("neck", "head")
+TWIST_FRICTION = 0.1
+"""Friction about the twist axis over that about the others: a limb's weight, for which the bound is
+set, has no lever about its own length (assumed)."""
 
 
 class Joints(NamedTuple):
@@ -105,3 +108,21 @@ def build_joints(body: Body, *, neck_stiffness: float = 1.0, muscle_tone: float 
         weight = body.body_mass * body.stature / (reference["body_mass"] * reference["stature"])
         joints.friction[i] = row["friction"] * weight * muscle_tone
     return joints
+
+
+def elastic_energy(joints: Joints, joint: int, vector: Array) -> Array:
+    """Return the elastic energy (k,) in J of a joint at rotation vectors (k, 3) in rad.
+
+    The vectors are those of the child from the centre of its range. Passive stiffness about the
+    neutral values, and stops that fade in beyond the range; the torque that follows is in
+    ``models.multibody.joints``.
+    """
+    rest = vector - joints.neutral[joint]
+    stiffness = np.where(rest > 0.0, joints.stiffness_high[joint], joints.stiffness_low[joint])
+    excess = np.maximum(np.abs(vector) - joints.half_range[joint], 0.0)
+    stop = np.where(vector > 0.0, joints.stop_high[joint], joints.stop_low[joint])
+    onset = joints.onset[joint]
+    beyond = np.maximum(excess - onset, 0.0)
+    inside = np.minimum(excess, onset)
+    depth = inside**3 / (6.0 * onset) + 0.5 * beyond * (beyond + onset)
+    return np.asarray((0.5 * stiffness * rest**2 + stop * depth).sum(axis=1))

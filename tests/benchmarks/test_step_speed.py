@@ -25,6 +25,7 @@ from models.multibody.tree import (
     update_kinematics,
 )
 from models.pedestrian.anthropometry import build_body
+from models.registry import load_model
 
 STEPS = 1000
 medians: dict[str, float] = {}
@@ -131,6 +132,22 @@ def test_whole_crash(benchmark: Any) -> None:
     medians["crash"] = median_of(benchmark)
     medians["steps"] = float(steps[0])
     assert steps[0] > 1000
+
+
+def test_planar_crash(benchmark: Any) -> None:
+    """Assembly, run and outputs of a planar crash; its steps are Pymunk's and ours."""
+    model = load_model("planar")
+    row = np.array([[item.nominal for item in model.inputs]])
+    found = benchmark.pedantic(model.run_batch, args=(row,), rounds=20, warmup_rounds=1)
+    assert found.status == ["ok"]
+
+
+def test_spatial_crash(benchmark: Any) -> None:
+    """The same of the multibody model."""
+    model = MultibodyModel()
+    row = np.array([[item.nominal for item in model.inputs]])
+    found = benchmark.pedantic(model.run_batch, args=(row,), rounds=20, warmup_rounds=1)
+    assert found.status == ["ok"]
 
 
 def test_assembly(benchmark: Callable[..., Any]) -> None:

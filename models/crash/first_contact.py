@@ -1,0 +1,65 @@
+"""Where a crash begins: overlaps that are no contact, and the place where the body just touches."""
+
+import numpy as np
+
+from models.compilation import kernel
+from models.contact.geometry import ellipsoid_direction
+from models.crash.car_contact import zone_separation
+from models.crash.surfaces import shape_of
+
+SEARCH_AHEAD = 1.5
+"""m ahead of the car from which the body is brought back until it touches."""
+SEARCH_BEHIND = -0.6
+"""m behind the car's foremost point where the search for a first contact gives up."""
+
+
+@kernel
+def widen_gaps(ellipsoids, contacts):
+    """Widen the gap of every pair of segments to what overlaps now.
+
+    Neighbouring ellipsoids overlap at rest; only what goes beyond that is contact.
+    """
+    for k in range(ellipsoids.pairs.shape[0]):
+        i, j = ellipsoids.pairs[k, 0], ellipsoids.pairs[k, 1]
+        _, _, _, separation = ellipsoid_direction(
+            contacts.centre[i, 0] - contacts.centre[j, 0],
+            contacts.centre[i, 1] - contacts.centre[j, 1],
+            contacts.centre[i, 2] - contacts.centre[j, 2],
+            shape_of(contacts, i),
+            shape_of(contacts, j),
+            0.0,
+            0.0,
+            0.0,
+        )
+        ellipsoids.pair_gap[k] = max(ellipsoids.pair_gap[k], -separation)
+
+
+@kernel
+def _touches(zones, ellipsoids, contacts, shift):
+    for i in range(ellipsoids.reach.shape[0]):
+        if ellipsoids.surface_law[i, 0] < 0:
+            continue
+        x, y, z = contacts.centre[i, 0] + shift, contacts.centre[i, 1], contacts.centre[i, 2]
+        for j in range(zones.radius.shape[0]):
+            found = zone_separation(zones, ellipsoids, contacts, j, i, x, y, z, 1.0, 0.0)
+            if found[0] < 0.0 and found[7] > 0.0:
+                return True
+    return False
+
+
+@kernel
+def first_contact_shift(zones, ellipsoids, contacts):
+    """Return the shift in x (m) that makes the body just touch the car, or NaN."""
+    clear, step = SEARCH_AHEAD, 0.02
+    while not _touches(zones, ellipsoids, contacts, clear - step):
+        clear -= step
+        if clear < SEARCH_BEHIND:
+            return np.nan
+    low, high = clear - step, clear
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        if _touches(zones, ellipsoids, contacts, middle):
+            low = middle
+        else:
+            high = middle
+    return high

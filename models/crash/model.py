@@ -1,0 +1,174 @@
+"""What crash models share behind the protocol: runs, batches, statuses."""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.crash import outcome
+from models.crash.record import END_REASONS, S_REASON
+from models.declaration import run_rows
+from models.effects.chain import build_chain
+from models.pedestrian.anthropometry import is_possible
+from models.protocol import OK, Batch, Input, Output, Run, complete_inputs
+from models.vehicle.profile import Vehicle, load_vehicle
+
+Array = NDArray[np.float64]
+
+TIME_LIMIT = 12.0
+"""s of crash after which a run counts as failed."""
+FRAME_INTERVAL = 2e-3
+"""s between frames of a scene."""
+
+NO_CONTACT = "no_contact"
+NO_HEAD_CONTACT = "no_head_contact"
+IMPOSSIBLE_BODY = "impossible_body"
+
+
+class CrashModel(ABC):
+    """A pedestrian against a braking car, from first contact to rest.
+
+    A crash model says what ``name``, ``version``, inputs and outputs it has and how it steps.
+
+    Parameters
+    ----------
+    vehicle : str
+        Name of a vehicle of the data folder.
+    tick : float
+        Finest step in s.
+    effects : mapping, optional
+        By effect of the catalogue the values of its parameters; those left out take the median of
+        their prior.
+
+    Raises
+    ------
+    ValueError
+        If the vehicle or an effect is unknown or the step is not within 1 us to 0.2 ms.
+    """
+
+    name: str
+    version: str
+    outputs: tuple[Output, ...]
+    effects: tuple[str, ...]
+    partial_status = frozenset({NO_HEAD_CONTACT})
+    _own_inputs: tuple[Input, ...]
+
+    def __init__(
+        self,
+        vehicle: str,
+        tick: float,
+        effects: Mapping[str, Mapping[str, float]] | None,
+    ) -> None:
+        if not 1e-6 <= float(tick) <= 2e-4:
+            raise ValueError(f"tick must lie within 1e-6 and 2e-4 s, given {tick}")
+        self.vehicle: Vehicle = load_vehicle(vehicle)
+        self.tick = float(tick)
+        self._chain = build_chain(self.name, effects)
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """Inputs in order."""
+        return self._own_inputs + self._chain.inputs
+
+    def run(self, inputs: Mapping[str, float]) -> Run:
+        """Run once, with time histories and scene.
+
+        Raises
+        ------
+        ValueError
+            If an input is unknown or outside its range.
+        """
+        return self._run(complete_inputs(self, inputs), None, None, scene=True)
+
+    def observe(
+        self,
+        inputs: Mapping[str, float],
+        channels: Collection[str],
+        outputs: Collection[str] = (),
+    ) -> Run:
+        """Run once for what a test records: only the channels and outputs that are named.
+
+        Parameters
+        ----------
+        inputs : by name. channels : ``<group>_<channel>``, e.g. ``head_acceleration``.
+        outputs : by name.
+
+        Raises
+        ------
+        ValueError
+            If an input is unknown or outside its range.
+        """
+        return self._run(complete_inputs(self, inputs), outputs, channels, scene=False)
+
+    def run_batch(self, rows: Array) -> Batch:
+        """Run rows of inputs.
+
+        Parameters
+        ----------
+        rows : (n, inputs) in the order of ``inputs``, SI units.
+
+        Raises
+        ------
+        ValueError
+            If the array has another number of columns or a value outside its range.
+        """
+        return run_rows(self, rows, self._row)
+
+    @abstractmethod
+    def _step(self, values: dict[str, float]) -> outcome.Raw | None:
+        """Return what the step loop leaves behind, or None if the body never touches the car."""
+
+    def _simulate(self, values: dict[str, float]) -> outcome.Raw | str:
+        """Return what the step loop leaves behind, or the status that keeps it from starting."""
+        if not is_possible(values["stature"], values["body_mass"], values["head_mass"]):
+            return IMPOSSIBLE_BODY
+        raw = self._step(values)
+        return NO_CONTACT if raw is None else raw
+
+    def _run(
+        self,
+        values: dict[str, float],
+        outputs: Collection[str] | None,
+        channels: Collection[str] | None,
+        *,
+        scene: bool,
+    ) -> Run:
+        raw = self._simulate(values)
+        if isinstance(raw, str):
+            return Run(values, raw, raw, self._empty(outputs))
+        signals = outcome.Signals(raw)
+        status, measured = self._judge(raw, signals, outputs)
+        reason = END_REASONS[int(raw.summary[S_REASON])]
+        histories = outcome.histories(raw, signals, channels)
+        return Run(
+            values, status, reason, measured, histories, outcome.scene(raw) if scene else None
+        )
+
+    def _row(self, values: dict[str, float]) -> tuple[str, dict[str, float]]:
+        """Return status and outputs of one run."""
+        raw = self._simulate(values)
+        if isinstance(raw, str):
+            return raw, self._empty()
+        return self._judge(raw, outcome.Signals(raw))
+
+    def _empty(self, wanted: Collection[str] | None = None) -> dict[str, float]:
+        names = (item.name for item in self.outputs if wanted is None or item.name in wanted)
+        return dict.fromkeys(names, math.nan)
+
+    def _judge(
+        self, raw: outcome.Raw, signals: outcome.Signals, wanted: Collection[str] | None = None
+    ) -> tuple[str, dict[str, float]]:
+        """Return the status of a run and its outputs, or those that are wanted."""
+        outputs = self._empty(wanted)
+        reason = END_REASONS[int(raw.summary[S_REASON])]
+        if not reason.startswith("rest"):
+            return reason, outputs
+        measures = outcome.measures(raw, signals)
+        outputs |= {name: measures[name]() for name in outputs if name in measures}
+        if math.isnan(measures["head_impact_time"]()):
+            return NO_HEAD_CONTACT, outputs
+        if not all(math.isfinite(value) for value in outputs.values()):
+            return "not_finite", self._empty(wanted)
+        return OK, outputs

@@ -1,0 +1,118 @@
+"""The planar crash model behind the model protocol."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from models import data
+from models.crash import outcome
+from models.crash.first_contact import first_contact_shift, widen_gaps
+from models.crash.model import FRAME_INTERVAL, TIME_LIMIT, CrashModel
+from models.crash.record import R_ZONES, S_FRAMES, S_GROUND_TIME, S_HEAD_ZONE, S_RECORDS, SUMMARY
+from models.crash.scenario import build_scenario
+from models.crash.surfaces import CHANNELS, Contacts, empty_contacts
+from models.declaration import read_inputs, read_outputs
+from models.effects.registry import effects_of
+from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
+from models.planar.body import PlanarBody, hold_in_plane, surfaces_in_plane
+from models.planar.chipmunk import EACH_BODY, STEP_SPACE
+from models.planar.joints import joints_in_plane
+from models.planar.space import STATE, PlanarSpace
+from models.planar.stepping import (
+    M_ROAD_TIME,
+    MEMORY,
+    PlanarMotion,
+    PlanarSettings,
+    empty_loads,
+    empty_motion,
+    show_surfaces,
+    simulate,
+)
+
+TICK = 1e-4
+"""Default finest step (s)."""
+COARSE, FLIGHT, ROAD = 3, 6, 20
+"""Ticks a step in contact with the car, above it, and clear of it."""
+
+_TABLE = data.load("planar.toml")
+_SPATIAL = data.load("multibody.toml")
+
+
+class PlanarModel(CrashModel):
+    """The body held in the plane of the car's travel: Pymunk's joints, our contact with the car.
+
+    See ``CrashModel`` for its parameters. Inputs and nominal values are those of the multibody
+    model; what it makes nothing of is marked.
+    """
+
+    name = "planar"
+    version = f"{_SPATIAL['version']}.{_TABLE['version']}"
+    outputs = tuple(item for item in read_outputs(_SPATIAL) if item.name not in _TABLE["left_out"])
+    effects: tuple[str, ...] = effects_of("planar")
+    _own_inputs = tuple(
+        replace(item, ignored=_TABLE["ignored"].get(item.name, ""))
+        for item in read_inputs(_SPATIAL)
+    )
+
+    def __init__(
+        self,
+        vehicle: str = "family_car_1990s",
+        tick: float = TICK,
+        effects: Mapping[str, Mapping[str, float]] | None = None,
+    ) -> None:
+        super().__init__(vehicle, tick, effects)
+        n, zones = len(SEGMENTS), len(self.vehicle.zones)
+        self._record = np.zeros((int(TIME_LIMIT / self.tick) + 2, R_ZONES + zones + 1))
+        self._frames = np.empty((int(TIME_LIMIT / FRAME_INTERVAL) + 2, 4 + 7 * n))
+
+    def _step(self, values: dict[str, float]) -> outcome.Raw | None:
+        scenario = build_scenario(values, self.vehicle, self._chain)
+        n, zones = len(SEGMENTS), len(self.vehicle.zones)
+        body = hold_in_plane(scenario.body, scenario.posture)
+        ellipsoids = surfaces_in_plane(scenario.ellipsoids, body, _TABLE["free"]["regions"])
+        contacts, motion = empty_contacts(n, zones, len(ellipsoids.pairs)), empty_motion(n)
+        _show(body, motion, contacts)
+        widen_gaps(ellipsoids, contacts)
+        shift = first_contact_shift(scenario.zones, ellipsoids, contacts)
+        if np.isnan(shift):
+            return None
+        body.centre[:, 0] += shift
+        body.joint[:, 0] += shift
+        car_motion = scenario.car_motion._replace(curvature=0.0)
+        joints = joints_in_plane(scenario.joints, body)
+        space = PlanarSpace(body, joints, scenario.road, ellipsoids, car_motion.speed)
+        settings = PlanarSettings(
+            tick=self.tick, coarse=COARSE, flight=FLIGHT, road=ROAD, time_limit=TIME_LIMIT,
+            step_limit=self._record.shape[0] - 1, frame_every=round(FRAME_INTERVAL / self.tick),
+            head=HEAD, trunk=max(TRUNK),
+        )  # fmt: skip
+        head_contact, summary = np.full(10, np.nan), np.zeros(SUMMARY)
+        memory = np.zeros(MEMORY)
+        memory[M_ROAD_TIME] = np.inf
+        summary[S_GROUND_TIME], summary[S_HEAD_ZONE] = np.inf, -1.0
+        simulate(
+            STEP_SPACE, EACH_BODY, space.link, body, joints.torque, ellipsoids, scenario.zones,
+            scenario.road, car_motion, settings, space.state, space.given, motion, empty_loads(n),
+            contacts, np.zeros(6), np.zeros(CHANNELS), memory,
+            self._record, self._frames, head_contact, summary,
+        )  # fmt: skip
+        return outcome.Raw(
+            scenario=replace(scenario, car_motion=car_motion, ellipsoids=ellipsoids),
+            chain=self._chain,
+            values=values,
+            record=self._record[: int(summary[S_RECORDS])],
+            frames=self._frames[: int(summary[S_FRAMES])],
+            work=np.empty(0),
+            head_contact=head_contact,
+            summary=summary,
+            primary_end=float(memory[M_ROAD_TIME]),
+            rigid_road=True,
+        )
+
+
+def _show(body: PlanarBody, motion: PlanarMotion, contacts: Contacts) -> None:
+    """Fill motion and surfaces at the start."""
+    state = np.zeros((len(SEGMENTS), STATE))
+    state[:, :2] = body.centre
+    show_surfaces(body, state, motion, contacts)

@@ -1,0 +1,183 @@
+"""The Pymunk space of a crash: segments, joints, road, and the car as a kinematic body.
+
+Pymunk solves the joints and the contact with the road; forces that deform something (car, flesh,
+joint stops) come from outside and are set before every step.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pymunk
+from numpy.typing import NDArray
+from pymunk.batch import BodyFields, Buffer, get_space_bodies
+
+from models.crash.ellipsoids import Ellipsoids
+from models.crash.road import Road
+from models.planar.body import PlanarBody, outline
+from models.planar.chipmunk import READ_BODY, WRITE_BODY, address_of, transfer
+from models.planar.joints import PlanarJoints
+
+Array = NDArray[np.float64]
+
+ITERATIONS = 10
+"""Sweeps of Pymunk's solver over joints and contacts a step; a hundred move HIC15 by 0.1 %."""
+JOINT_RELAXATION = 0.005
+"""s in which a drifted joint closes again (assumed)."""
+CONTACT_RELAXATION = 0.02
+"""s in which an overlap with the road is pushed out (assumed)."""
+SLOP = 1e-3
+"""m of overlap with the road that Pymunk leaves."""
+CORNERS = 16
+"""Of the polygon that stands for a segment's shadow on the road: 1 % of its width."""
+REACH = 600.0
+"""m of road ahead and behind: the fastest car of the inputs, over the time limit."""
+THICKNESS = 1.0
+"""m of road."""
+
+# Columns of a body's state.
+X, Z, ANGLE, SPEED_X, SPEED_Z, SPIN = range(6)
+STATE = 6
+# Columns of what is written to a body before a step: its velocity again, or the car's new one.
+GIVEN_X, GIVEN_Z, FORCE_X, FORCE_Z, TORQUE = range(5)
+GIVEN = 5
+
+_STATE_FIELDS = (
+    BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
+)
+_GIVEN_FIELDS = BodyFields.VELOCITY | BodyFields.FORCE | BodyFields.TORQUE
+
+
+class Link(NamedTuple):
+    """A space as the compiled step loop has it: addresses, and places in the two arrays.
+
+    Attributes
+    ----------
+    space : address. reader, read_data, read_place : of a transfer into ``state``.
+    writer, write_data, write_place : of one out of ``given``. car : row of the car.
+    """
+
+    space: int
+    reader: int
+    read_data: int
+    read_place: NDArray[np.int32]
+    writer: int
+    write_data: int
+    write_place: NDArray[np.int32]
+    car: int
+
+
+class PlanarSpace:
+    """A fresh space for one crash.
+
+    Pymunk numbers bodies and keeps contacts from step to step, so a space that has been used gives
+    other bits: every run builds its own.
+
+    Parameters
+    ----------
+    body, joints, road : of the scenario, in the plane.
+    ellipsoids : for the energy that flesh gives back.
+    speed : m/s of the car at first contact.
+
+    Attributes
+    ----------
+    state : (b, 6) x, z (m), angle (rad) and their rates of all bodies, segments first.
+    space : Pymunk's own.
+    given : (b, 5) velocity (m/s), force (N) and torque (N m) for the next step. link : Link
+    """
+
+    def __init__(
+        self,
+        body: PlanarBody,
+        joints: PlanarJoints,
+        road: Road,
+        ellipsoids: Ellipsoids,
+        speed: float,
+    ) -> None:
+        self.space = space = pymunk.Space()
+        space.gravity = road.pull, -road.weight
+        space.iterations = ITERATIONS
+        space.collision_slop = SLOP
+        space.collision_bias = math.exp(-1.0 / CONTACT_RELAXATION)
+        segments = [_segment(body, i) for i in range(body.mass.size)]
+        space.add(*segments)
+        car = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        car.velocity = speed, 0.0
+        space.add(car)
+        for i, parent in enumerate(body.parent):
+            if parent >= 0:
+                joint = (float(body.joint[i, 0]), float(body.joint[i, 1]))
+                space.add(*_joint(segments[parent], segments[i], joint, joints, i))
+        for i, segment in enumerate(segments):
+            shape = pymunk.Poly(segment, outline(body, i, CORNERS))
+            shape.friction = 1.0
+            shape.elasticity = _restitution(ellipsoids, i)
+            # Segments and car meet by their own laws, not by Pymunk's.
+            shape.filter = pymunk.ShapeFilter(group=1)
+            space.add(shape)
+        space.add(*_road(space.static_body, road))
+        buffer, loads = Buffer(), Buffer()
+        get_space_bodies(space, BodyFields.BODY_ID, buffer)
+        rows = np.frombuffer(buffer.int_buf(), dtype=np.uintp).tolist()
+        row = rows.index(car.id)
+        if rows[: len(segments)] != [segment.id for segment in segments]:
+            raise RuntimeError("Pymunk does not give the bodies in the order in which they came")
+        # From here on the buffer keeps its place: it holds all bodies.
+        get_space_bodies(space, _STATE_FIELDS, buffer)
+        self.state: Array = np.frombuffer(buffer.float_buf()).reshape(-1, STATE)
+        self.given: Array = np.zeros((len(rows), GIVEN))
+        loads.set_float_buf(self.given)
+        self._read, self._write = transfer(buffer, _STATE_FIELDS), transfer(loads, _GIVEN_FIELDS)
+        self.link = Link(
+            address_of(space), READ_BODY, self._read.data, self._read.place,
+            WRITE_BODY, self._write.data, self._write.place, row,
+        )  # fmt: skip
+
+
+def _segment(body: PlanarBody, i: int) -> pymunk.Body:
+    segment = pymunk.Body(float(body.mass[i]), float(body.inertia[i]))
+    segment.position = float(body.centre[i, 0]), float(body.centre[i, 1])
+    segment.velocity = float(body.velocity[i, 0]), float(body.velocity[i, 1])
+    segment.angular_velocity = float(body.spin[i])
+    return segment
+
+
+def _joint(
+    parent: pymunk.Body,
+    child: pymunk.Body,
+    place: tuple[float, float],
+    joints: PlanarJoints,
+    row: int,
+) -> list[pymunk.Constraint]:
+    """Return pivot, damper and friction of a joint; its springs and stops come from outside."""
+    pivot = pymunk.PivotJoint(parent, child, place)
+    pivot.error_bias = math.exp(-1.0 / JOINT_RELAXATION)
+    damper = pymunk.DampedRotarySpring(parent, child, 0.0, 0.0, float(joints.damping[row]))
+    brake = pymunk.SimpleMotor(parent, child, 0.0)
+    brake.max_force = float(joints.friction[row])
+    return [pivot, damper, brake] if joints.friction[row] > 0.0 else [pivot, damper]
+
+
+def _restitution(ellipsoids: Ellipsoids, segment: int) -> float:
+    """Return the restitution of a segment on the road: the root of the energy that it gives back.
+
+    By the law against the road, at its last knot.
+    """
+    law = int(ellipsoids.surface_law[segment, -1])
+    last = int(ellipsoids.counts[law]) - 1
+    depth, _, recovery, _ = ellipsoids.laws[law, last]
+    return math.sqrt(min(float(recovery / depth), 1.0))
+
+
+def _road(ground: pymunk.Body, road: Road) -> list[pymunk.Shape]:
+    """Return the road, from some place on with another friction if there is one."""
+    change = min(max(road.wet_from, -REACH), REACH)
+    parts = [(-REACH, change, road.friction), (change, REACH, road.wet_friction)]
+    shapes: list[pymunk.Shape] = []
+    for low, high, friction in parts:
+        if high > low:
+            corners = [(low, 0.0), (high, 0.0), (high, -THICKNESS), (low, -THICKNESS)]
+            shape = pymunk.Poly(ground, corners)
+            shape.friction, shape.elasticity = friction, 1.0
+            shapes.append(shape)
+    return shapes

@@ -1,0 +1,452 @@
+"""The step loop: our forces and record between the steps of Pymunk's space, all compiled."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.compilation import inlined_kernel, kernel
+from models.crash.body_contact import apply_self_contacts
+from models.crash.car_contact import apply_car_contacts, zone_separation
+from models.crash.record import (
+    NOT_FINITE,
+    R_ACCELERATION,
+    R_CENTRE,
+    R_HEAD_CAR,
+    R_HEAD_ROAD,
+    R_RELATIVE,
+    R_SPIN,
+    R_SPIN_RATE,
+    R_TIME,
+    R_ZONES,
+    REST,
+    REST_ON_CAR,
+    REST_SPEED,
+    REST_SPREAD,
+    REST_TIME,
+    S_CENTRE_SPEED,
+    S_FRAMES,
+    S_GROUND_TIME,
+    S_HEAD_DEPTH,
+    S_HEAD_ZONE,
+    S_REASON,
+    S_RECORDS,
+    S_STEPS,
+    S_TIME,
+    STEP_LIMIT,
+    TIME_LIMIT,
+)
+from models.crash.stepping import HEAD_NEAR, head_meets_car
+from models.planar.space import (
+    ANGLE,
+    FORCE_X,
+    FORCE_Z,
+    GIVEN_X,
+    GIVEN_Z,
+    SPEED_X,
+    SPEED_Z,
+    SPIN,
+    TORQUE,
+    X,
+    Z,
+)
+from models.vehicle.motion import car_state
+
+Array = NDArray[np.float64]
+
+TOUCH = 0.005
+"""m above the road at which a segment counts as landed: the road's slop and the polygon's error."""
+CLEAR = 0.1
+"""m ahead of the car from which a segment cannot meet it within the longest step (assumed)."""
+
+FASTEST = 1e3
+"""m/s of segments on average beyond which a run has come apart (assumed)."""
+
+# Entries of the memory from step to step.
+(
+    M_TICKS,
+    M_STEPS,
+    M_ROWS,
+    M_SHOTS,
+    M_QUIET,
+    M_LENGTH,
+    M_TOUCHED,
+    M_SPEED_X,
+    M_SPEED_Z,
+    M_SPIN,
+    M_AIRBORNE,
+    M_ROAD_TIME,
+) = range(12)
+MEMORY = 12
+
+
+class PlanarMotion(NamedTuple):
+    """Places and rates of ``n`` segments in world axes, (n, 3), as the contacts read them."""
+
+    centre: Array
+    velocity: Array
+    angular_velocity: Array
+
+
+class PlanarLoads(NamedTuple):
+    """Loads (n, 3) on the segments in world axes."""
+
+    force: Array
+    torque: Array
+
+
+class PlanarSettings(NamedTuple):
+    """How a run is stepped and recorded.
+
+    Attributes
+    ----------
+    tick : s, the finest step. coarse, flight, road : ticks a step in contact with the car, above
+        it, and clear of it. time_limit : s. step_limit : steps. frame_every : ticks.
+    head : row of the head. trunk : highest row of the trunk.
+    """
+
+    tick: float
+    coarse: int
+    flight: int
+    road: int
+    time_limit: float
+    step_limit: int
+    frame_every: int
+    head: int
+    trunk: int
+
+
+def empty_motion(n: int) -> PlanarMotion:
+    """Return the motion of ``n`` segments at rest at the origin."""
+    return PlanarMotion(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)))
+
+
+def empty_loads(n: int) -> PlanarLoads:
+    """Return no load on ``n`` segments."""
+    return PlanarLoads(np.zeros((n, 3)), np.zeros((n, 3)))
+
+
+@inlined_kernel
+def update_motion(body, state, ahead, motion, contacts):
+    """Write motion, ellipsoid centres and shape matrices ``ahead`` s after a state.
+
+    Bodies move on at the velocities that they have.
+    """
+    for i in range(body.mass.shape[0]):
+        angle = state[i, ANGLE] + ahead * state[i, SPIN]
+        c, s = math.cos(angle), math.sin(angle)
+        x, z = state[i, X] + ahead * state[i, SPEED_X], state[i, Z] + ahead * state[i, SPEED_Z]
+        motion.centre[i, 0], motion.centre[i, 2] = x, z
+        motion.velocity[i, 0], motion.velocity[i, 2] = state[i, SPEED_X], state[i, SPEED_Z]
+        motion.angular_velocity[i, 1] = -state[i, SPIN]
+        ox, oz = body.offset[i, 0], body.offset[i, 1]
+        contacts.centre[i, 0] = x + c * ox - s * oz
+        contacts.centre[i, 2] = z + s * ox + c * oz
+        xx, xz, zz = body.shadow[i, 0], body.shadow[i, 1], body.shadow[i, 2]
+        contacts.shape[i, 0] = c * c * xx - 2.0 * c * s * xz + s * s * zz
+        contacts.shape[i, 2] = c * s * (xx - zz) + (c * c - s * s) * xz
+        # Across the plane any extent will do: there is no contact along it.
+        contacts.shape[i, 3] = 1.0
+        contacts.shape[i, 5] = s * s * xx + 2.0 * c * s * xz + c * c * zz
+
+
+@inlined_kernel
+def _add_joint_torques(body, table, state, ahead, given):
+    cells = table.shape[1] - 1
+    for i in range(1, body.mass.shape[0]):
+        p = body.parent[i]
+        angle = state[i, ANGLE] - state[p, ANGLE] + ahead * (state[i, SPIN] - state[p, SPIN])
+        place = (angle + math.pi) / (2.0 * math.pi) * cells
+        place = min(max(place, 0.0), cells - 1e-9)
+        k = int(place)
+        torque = table[i, k] + (place - k) * (table[i, k + 1] - table[i, k])
+        given[i, TORQUE] += torque
+        given[p, TORQUE] -= torque
+
+
+@inlined_kernel
+def _write_record(row, time, body, road, settings, state, contacts, car, memory, record):
+    """Write a row, and into the one before the head's acceleration since then."""
+    head = settings.head
+    zones = contacts.zone_force.shape[0] - 1
+    if row > 0:
+        length = memory[M_LENGTH]
+        spin_rate = (state[head, SPIN] - memory[M_SPIN]) / length
+        ax = (state[head, SPEED_X] - memory[M_SPEED_X]) / length
+        az = (state[head, SPEED_Z] - memory[M_SPEED_Z]) / length
+        record[row - 1, R_ACCELERATION] = ax - road.pull
+        record[row - 1, R_ACCELERATION + 2] = az + road.weight
+        for k in range(3):
+            record[row - 1, R_SPIN_RATE + k] = -spin_rate * body.normal[head, k]
+            # The last row has no step after it.
+            record[row, R_SPIN_RATE + k] = record[row - 1, R_SPIN_RATE + k]
+            record[row, R_ACCELERATION + k] = record[row - 1, R_ACCELERATION + k]
+    record[row, R_TIME] = time
+    for k in range(3):
+        record[row, R_SPIN + k] = -state[head, SPIN] * body.normal[head, k]
+    record[row, R_RELATIVE] = state[head, SPEED_X] - car[3]
+    record[row, R_RELATIVE + 2] = state[head, SPEED_Z]
+    force = 0.0
+    for j in range(zones):
+        force += contacts.segment_force[head, j]
+        record[row, R_ZONES + j] = contacts.zone_force[j]
+    record[row, R_HEAD_CAR] = force
+    # Pymunk's impulses on the road are no forces.
+    record[row, R_HEAD_ROAD] = math.nan
+    record[row, R_ZONES + zones] = math.nan
+    total, x, z = 0.0, 0.0, 0.0
+    for i in range(body.mass.shape[0]):
+        total += body.mass[i]
+        x += body.mass[i] * state[i, X]
+        z += body.mass[i] * state[i, Z]
+    record[row, R_CENTRE] = x / total
+    record[row, R_CENTRE + 2] = z / total
+
+
+@inlined_kernel
+def _write_frame(row, time, body, state, contacts, car, frames):
+    frames[row, 0] = time
+    frames[row, 1], frames[row, 2], frames[row, 3] = car[0], car[1], car[2]
+    for i in range(body.mass.shape[0]):
+        first = 4 + 7 * i
+        frames[row, first] = contacts.centre[i, 0]
+        frames[row, first + 1] = body.side[i]
+        frames[row, first + 2] = contacts.centre[i, 2]
+        # The start's quaternion, turned about -y.
+        c, s = math.cos(0.5 * state[i, ANGLE]), -math.sin(0.5 * state[i, ANGLE])
+        w, x, y, z = (
+            body.orientation[i, 0],
+            body.orientation[i, 1],
+            body.orientation[i, 2],
+            body.orientation[i, 3],
+        )
+        frames[row, first + 3] = c * w - s * y
+        frames[row, first + 4] = c * x + s * z
+        frames[row, first + 5] = c * y + s * w
+        frames[row, first + 6] = c * z - s * x
+
+
+@inlined_kernel
+def _note_head(time, settings, state, contacts, car, memory, head_contact, summary):
+    """Note the head's first contact with the car and its deepest place in it."""
+    head = settings.head
+    deepest = summary[S_HEAD_DEPTH]
+    for j in range(contacts.zone_force.shape[0] - 1):
+        if contacts.segment_force[head, j] <= 0.0:
+            continue
+        if memory[M_TOUCHED] == 0.0:
+            memory[M_TOUCHED] = 1.0
+            head_contact[0] = time
+            head_contact[1] = state[head, SPEED_X] - car[3]
+            head_contact[2] = 0.0
+            head_contact[3] = state[head, SPEED_Z]
+            for k in range(3):
+                head_contact[4 + k] = contacts.normal[head, j, k]
+        if contacts.largest[head, j] > deepest and summary[S_GROUND_TIME] == math.inf:
+            deepest = contacts.largest[head, j]
+            summary[S_HEAD_ZONE] = float(j)
+            for k in range(3):
+                head_contact[7 + k] = contacts.point[head, j, k]
+    summary[S_HEAD_DEPTH] = deepest
+
+
+@inlined_kernel
+def _lands(settings, motion, contacts, ahead, any_segment):
+    """Return whether trunk or head, or any segment, touches the road within ``ahead`` s."""
+    for i in range(contacts.centre.shape[0]):
+        gap = contacts.centre[i, 2] - math.sqrt(contacts.shape[i, 5]) - TOUCH
+        fall = max(-motion.velocity[i, 2], 0.0)
+        if (any_segment or i <= settings.trunk or i == settings.head) and gap < ahead * fall:
+            return True
+    return False
+
+
+@inlined_kernel
+def _note_landing(time, settings, motion, contacts, memory, summary):
+    """Note when trunk or head lands, and when the road begins to act on the head's signals.
+
+    That is when any segment lands after the body, its head having met the car, was in the air.
+    """
+    coarse = settings.coarse * settings.tick
+    if summary[S_GROUND_TIME] == math.inf and _lands(settings, motion, contacts, coarse, False):
+        summary[S_GROUND_TIME] = time
+        memory[M_ROAD_TIME] = min(memory[M_ROAD_TIME], time)
+    if memory[M_TOUCHED] > 0.0 and memory[M_ROAD_TIME] == math.inf:
+        low = _lands(settings, motion, contacts, coarse, True)
+        if low and memory[M_AIRBORNE] > 0.0:
+            memory[M_ROAD_TIME] = time
+        elif not low:
+            memory[M_AIRBORNE] = 1.0
+
+
+@inlined_kernel
+def _speeds(body, state):
+    """Return the speed of the centre of gravity and the root mean square segment speed."""
+    total, x, z, square = 0.0, 0.0, 0.0, 0.0
+    for i in range(body.mass.shape[0]):
+        m, vx, vz = body.mass[i], state[i, SPEED_X], state[i, SPEED_Z]
+        total += m
+        x += m * vx
+        z += m * vz
+        square += m * (vx * vx + vz * vz)
+    return math.hypot(x, z) / total, math.sqrt(square / total)
+
+
+@inlined_kernel
+def _is_near(head, ellipsoids, zones, car, contacts):
+    """Return whether the head is within ``HEAD_NEAR`` of a zone."""
+    x, z = contacts.centre[head, 0] - car[0], contacts.centre[head, 2]
+    for j in range(zones.radius.shape[0]):
+        found = zone_separation(zones, ellipsoids, contacts, j, head, x, 0.0, z, 1.0, 0.0)
+        if found[0] < HEAD_NEAR:
+            return True
+    return False
+
+
+@inlined_kernel
+def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts, landed):
+    head = settings.head
+    if head_meets_car(head, ellipsoids, zones, car, motion, contacts) and (
+        _is_near(head, ellipsoids, zones, car, contacts)
+    ):
+        return 1
+    for j in range(contacts.zone_force.shape[0] - 1):
+        if contacts.zone_force[j] > 0.0:
+            return settings.coarse
+    if not landed and _lands(settings, motion, contacts, 2.0 * settings.road * settings.tick, True):
+        return settings.coarse
+    for i in range(contacts.centre.shape[0]):
+        if contacts.centre[i, 0] - car[0] < ellipsoids.reach[i] + CLEAR:
+            return settings.flight
+    return settings.road
+
+
+@inlined_kernel
+def _apply_loads(
+    body, table, ellipsoids, zones, state, ahead, given, motion, loads, contacts, car, power
+):  # fmt: skip
+    """Write the loads of a step of ``ahead`` s, and every body's own velocity.
+
+    Chipmunk moves the bodies at their old velocities before it changes these, so the forces are
+    those where the bodies will then be: explicit Euler becomes the symplectic one.
+    """
+    update_motion(body, state, ahead, motion, contacts)
+    for j in range(contacts.zone_force.shape[0]):
+        contacts.zone_force[j] = 0.0
+    n = body.mass.shape[0]
+    for i in range(n):
+        for k in range(3):
+            loads.force[i, k] = 0.0
+            loads.torque[i, k] = 0.0
+    apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, body, power)
+    apply_self_contacts(ellipsoids, motion, loads, contacts, body, power)
+    for i in range(n):
+        given[i, FORCE_X], given[i, FORCE_Z] = loads.force[i, 0], loads.force[i, 2]
+        given[i, TORQUE] = -loads.torque[i, 1]
+        given[i, GIVEN_X], given[i, GIVEN_Z] = state[i, SPEED_X], state[i, SPEED_Z]
+    _add_joint_torques(body, table, state, ahead, given)
+
+
+@inlined_kernel
+def _end_reason(settings, body, state, contacts, memory, time):
+    """Return why the run ends now, -1 if it goes on."""
+    speed, spread = _speeds(body, state)
+    quiet = speed < REST_SPEED and spread < REST_SPREAD
+    memory[M_QUIET] = memory[M_QUIET] + memory[M_LENGTH] if quiet else 0.0
+    # Chipmunk ends the whole process where it meets a number that is none.
+    if not spread < FASTEST:
+        return NOT_FINITE
+    if memory[M_QUIET] >= REST_TIME:
+        for j in range(contacts.zone_force.shape[0] - 1):
+            if contacts.zone_force[j] > 0.0:
+                return REST_ON_CAR
+        return REST
+    if time >= settings.time_limit:
+        return TIME_LIMIT
+    if memory[M_STEPS] >= settings.step_limit:
+        return STEP_LIMIT
+    return -1
+
+
+@kernel
+def simulate(
+    step_space, each_body, link, body, table, ellipsoids, zones, road, car_motion, settings,
+    state, given, motion, loads, contacts, car, power, memory,
+    record, frames, head_contact, summary,
+):  # fmt: skip
+    """Run a space from its present state to rest.
+
+    Parameters
+    ----------
+    step_space, each_body : as in ``models.planar.chipmunk``. link : of the space.
+    body, table, ellipsoids, zones, road, car_motion, settings : constant data.
+    state, given : of the space, changed in place.
+    motion, loads, contacts, car, power, memory : workspace; car as in ``models.vehicle.motion``.
+    record, frames, head_contact, summary : as in ``models.multibody.simulation``; road forces are
+        NaN.
+    """
+    head = settings.head
+    reason = -1
+    car_state(car_motion, 0.0, car)
+    _apply_loads(
+        body, table, ellipsoids, zones, state, 0.0, given, motion, loads, contacts, car, power
+    )
+    while True:
+        time = memory[M_TICKS] * settings.tick
+        update_motion(body, state, 0.0, motion, contacts)
+        row = int(memory[M_ROWS])
+        if row < record.shape[0]:
+            _write_record(row, time, body, road, settings, state, contacts, car, memory, record)
+            memory[M_ROWS] += 1.0
+        shot = int(memory[M_SHOTS])
+        if memory[M_TICKS] >= shot * settings.frame_every and shot < frames.shape[0]:
+            _write_frame(shot, time, body, state, contacts, car, frames)
+            memory[M_SHOTS] += 1.0
+        _note_head(time, settings, state, contacts, car, memory, head_contact, summary)
+        _note_landing(time, settings, motion, contacts, memory, summary)
+        reason = _end_reason(settings, body, state, contacts, memory, time)
+        if reason >= 0:
+            break
+        landed = memory[M_ROAD_TIME] < math.inf or memory[M_TOUCHED] == 0.0
+        ticks = _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts, landed)
+        length = ticks * settings.tick
+        memory[M_SPEED_X], memory[M_SPEED_Z] = state[head, SPEED_X], state[head, SPEED_Z]
+        memory[M_SPIN], memory[M_LENGTH] = state[head, SPIN], length
+        memory[M_TICKS] += ticks
+        memory[M_STEPS] += 1.0
+        # The mean speed brings the car exactly to where it is at the step's end.
+        car_state(car_motion, memory[M_TICKS] * settings.tick, car)
+        _apply_loads(
+            body,
+            table,
+            ellipsoids,
+            zones,
+            state,
+            length,
+            given,
+            motion,
+            loads,
+            contacts,
+            car,
+            power,
+        )
+        given[link.car, GIVEN_X] = (car[0] - state[link.car, X]) / length
+        link.write_place[0] = 0
+        each_body(link.space, link.writer, link.write_data)
+        step_space(link.space, length)
+        link.read_place[0] = 0
+        each_body(link.space, link.reader, link.read_data)
+    speed, _ = _speeds(body, state)
+    summary[S_REASON] = float(reason)
+    summary[S_TIME] = time
+    summary[S_STEPS] = memory[M_STEPS]
+    summary[S_RECORDS] = memory[M_ROWS]
+    summary[S_FRAMES] = memory[M_SHOTS]
+    summary[S_CENTRE_SPEED] = speed
+
+
+@kernel
+def show_surfaces(body, state, motion, contacts):
+    """Fill motion and surfaces for a state, before there is a step."""
+    update_motion(body, state, 0.0, motion, contacts)

@@ -21,10 +21,12 @@ from mcstudy.inputs import (
 )
 from mcstudy.schema import (
     KINDS,
+    CommonStudy,
     ComparisonRow,
     ComparisonTable,
     FactorStudy,
     InjuryStudy,
+    ModelComparison,
     MonteCarloStudy,
     MorrisStudy,
     Reconstruction,
@@ -35,10 +37,12 @@ from mcstudy.schema import (
 from mcstudy.simulator import Simulator
 
 __all__ = [
+    "CommonStudy",
     "ComparisonRow",
     "ComparisonTable",
     "FactorStudy",
     "InjuryStudy",
+    "ModelComparison",
     "MonteCarloStudy",
     "MorrisStudy",
     "Reconstruction",
@@ -115,7 +119,7 @@ def _one_line(text: object, longest: int = 200) -> str:
     return line if len(line) <= longest else line[:longest] + "..."
 
 
-def fixed_values(study: Study, model: Simulator) -> dict[str, float]:
+def fixed_values(study: CommonStudy, model: Simulator) -> dict[str, float]:
     """Return the fixed inputs in the model's units.
 
     Raises

@@ -105,21 +105,26 @@ class Report(StudyTable):
     references: list[Reference] = []
 
 
-class CommonStudy(StudyTable):
+class AnyStudy(StudyTable):
     """What every kind of study has."""
 
     format: Literal["mcstudy-study/1"]
     name: str
     title: str
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 0
-    model: ModelChoice
     fixed: dict[str, Value] = {}
-    effects: dict[str, dict[str, FiniteFloat]] = {}
 
     @model_validator(mode="after")
-    def _plain_name(self) -> "CommonStudy":
+    def _plain_name(self) -> "AnyStudy":
         _check_folder_name(self.name)
         return self
+
+
+class CommonStudy(AnyStudy):
+    """What every kind of study of one model has."""
+
+    model: ModelChoice
+    effects: dict[str, dict[str, FiniteFloat]] = {}
 
 
 class MonteCarloStudy(CommonStudy):
@@ -133,11 +138,16 @@ class MonteCarloStudy(CommonStudy):
     report: Report = Report()
 
 
+STRIP_TIMES = [0.0, 0.02, 0.04, 0.06, 0.08]
+"""s after first contact at which a crash is drawn, as the case's paper does."""
+
+
 class ComparisonRow(StudyTable):
     """A row of a table to print beside our run."""
 
     label: str
     values: dict[str, FiniteFloat]
+    kind: Literal["simulated", "observed"] = "simulated"
 
 
 class ComparisonTable(StudyTable):
@@ -153,7 +163,7 @@ class Reconstruction(CommonStudy):
 
     kind: Literal["reconstruction"]
     tables: list[ComparisonTable] = []
-    strip_times: Annotated[list[FiniteFloat], Field(min_length=1)] = [0.0, 0.02, 0.04, 0.06, 0.08]
+    strip_times: Annotated[list[FiniteFloat], Field(min_length=1)] = STRIP_TIMES
 
 
 class FactorStudy(CommonStudy):
@@ -335,7 +345,33 @@ class InjuryStudy(CommonStudy):
         return self
 
 
-Study = MonteCarloStudy | Reconstruction | SobolStudy | MorrisStudy | InjuryStudy
+class ComparisonReport(StudyTable):
+    """``[report]`` of a comparison: outputs to compare, times at which nominal runs are drawn."""
+
+    outputs: Annotated[list[str], Field(min_length=1)] | None = None
+    strip_times: Annotated[list[FiniteFloat], Field(min_length=1)] = STRIP_TIMES
+
+
+class ModelComparison(AnyStudy):
+    """``kind = "model-comparison"``: the same inputs through two or more models."""
+
+    kind: Literal["model-comparison"]
+    models: Annotated[dict[str, ModelChoice], Field(min_length=2)]
+    design: Design = Design()
+    inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
+    dependence: Dependence = Dependence()
+    max_failure_rate: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
+    report: ComparisonReport = ComparisonReport()
+    tables: list[ComparisonTable] = []
+
+    @model_validator(mode="after")
+    def _plain_labels(self) -> "ModelComparison":
+        for label in self.models:
+            _check_folder_name(label, "models: ")
+        return self
+
+
+Study = MonteCarloStudy | Reconstruction | SobolStudy | MorrisStudy | InjuryStudy | ModelComparison
 SampledStudy = MonteCarloStudy | SobolStudy | MorrisStudy
 KINDS: tuple[str, ...] = tuple(
     get_args(kind.model_fields["kind"].annotation)[0] for kind in get_args(Study)

@@ -11,6 +11,7 @@ SALTELLI = 2
 GIVEN_DATA = 3
 MORRIS = 4
 OUTCOME = 5
+AGREEMENT = 6
 
 
 def generator(seed: int, stream: int, index: int = 0) -> np.random.Generator:

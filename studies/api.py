@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mcstudy.config import Reconstruction, Study, load_study
+from mcstudy.config import ModelComparison, Reconstruction, Study, load_study
 from mcstudy.errors import UserError
 from mcstudy.report import Table
 from mcstudy.results import ResultsFolder
@@ -21,6 +21,8 @@ from models.protocol import Run
 from studies.execution import load_study_model
 from studies.injury import report as injury_report
 from studies.injury import study as injury
+from studies.model_comparison import report as model_comparison_report
+from studies.model_comparison import study as model_comparison
 from studies.monte_carlo import report as monte_carlo_report
 from studies.monte_carlo import study as monte_carlo
 from studies.morris import report as morris_report
@@ -53,6 +55,11 @@ PIPELINES = {
     "sobol": Pipeline(sobol.run_sobol, sobol.build_report, sobol_report.summarise),
     "morris": Pipeline(morris.run_morris, morris.build_report, morris_report.summarise),
     "injury": Pipeline(injury.run_injury, injury.build_report, injury_report.summarise),
+    "model-comparison": Pipeline(
+        model_comparison.run_comparison,
+        model_comparison.build_report,
+        model_comparison_report.summarise,
+    ),
 }
 """A new kind of study is its modules, its class in ``mcstudy.schema`` and one line here."""
 
@@ -159,6 +166,8 @@ def rerun(results: ResultsFolder, run: int) -> Run:
         If the folder has no such run.
     """
     study = load_study(results.path / "study.toml")
+    if isinstance(study, ModelComparison):
+        raise UserError(f"{results.path}: give the folder of one of its models, under cells")
     model = load_study_model(study)
     runs = results.runs()
     row = runs[runs["run"] == run]

@@ -13,7 +13,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mcstudy import config, runner
-from mcstudy.config import FactorStudy, InjuryStudy, MonteCarloStudy, SampledStudy, Study
+from mcstudy.config import (
+    CommonStudy,
+    FactorStudy,
+    InjuryStudy,
+    MonteCarloStudy,
+    SampledStudy,
+)
 from mcstudy.errors import UserError
 from mcstudy.failures import locate_failures
 from mcstudy.figures import style
@@ -28,7 +34,7 @@ from studies import evaluation
 PACKAGES = ("numpy", "scipy", "numba", "pandas", "joblib", "pyarrow", "salib")
 
 
-def load_study_model(study: Study) -> Model:
+def load_study_model(study: CommonStudy) -> Model:
     """Return the model of a study.
 
     Raises

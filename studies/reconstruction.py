@@ -1,5 +1,6 @@
 """The reconstruction: one run, printed beside published tables and drawn."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,7 +55,7 @@ _VIEWS = {
 
 @dataclass(frozen=True)
 class Comparison:
-    """A published table with our row: title, head, rows of numbers, last row ours."""
+    """A published table with our rows: title, head, rows of numbers, the last ones ours."""
 
     title: str
     head: list[str]
@@ -88,11 +89,26 @@ def reconstruct(study: Reconstruction) -> tuple[Run, list[Comparison]]:
     run = model.run(values)
     if run.status not in complete_status(model):
         raise StudyError(f"the run ended with status {run.status!r}")
-    return run, [_compare(table, run, model) for table in study.tables]
-
-
-def _compare(table: ComparisonTable, run: Run, model: Model) -> Comparison:
     si = {item.name: item.unit for item in model.outputs}
+    ours = {"this run": run.outputs}
+    return run, [compare_with_table(table, ours, si) for table in study.tables]
+
+
+def compare_with_table(
+    table: ComparisonTable, ours: Mapping[str, Mapping[str, float]], si: Mapping[str, str]
+) -> Comparison:
+    """Return a published table with rows of our own below it.
+
+    Parameters
+    ----------
+    table : as in a study file. ours : outputs in SI units by label of the row.
+    si : unit of each output.
+
+    Raises
+    ------
+    UserError
+        If a unit does not fit.
+    """
     names = list(table.units)
     try:
         scale = {name: units.factor(si[name], table.units[name]) for name in names}
@@ -101,7 +117,8 @@ def _compare(table: ComparisonTable, run: Run, model: Model) -> Comparison:
     rows: list[tuple[str, list[float | None]]] = [
         (row.label, [row.values.get(name) for name in names]) for row in table.rows
     ]
-    rows.append(("this run", [run.outputs[name] * scale[name] for name in names]))
+    for label, outputs in ours.items():
+        rows.append((label, [outputs[k] * scale[k] if k in outputs else None for k in names]))
     head = [f"{style.words(n)} [{unit(table.units[n]) or '–'}]" for n in names]
     return Comparison(table.title, head, rows)
 

@@ -52,7 +52,12 @@ _UNIT_TEXT = {"1": "", "m/s2": "m/s²", "rad/s2": "rad/s²"}
 
 def label(name: str, unit: str = "1") -> str:
     """Return an axis label: the quantity in words and its unit in square brackets."""
-    return f"{words(name)} [{_UNIT_TEXT.get(unit, unit) or '–'}]"
+    return f"{words(name)} {bracketed(unit)}"
+
+
+def bracketed(unit: str) -> str:
+    """Return a unit in square brackets."""
+    return f"[{_UNIT_TEXT.get(unit, unit) or '–'}]"
 
 
 def words(name: str) -> str:

@@ -18,10 +18,9 @@ from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
 from models.planar.body import PlanarBody, hold_in_plane, surfaces_in_plane
 from models.planar.chipmunk import EACH_BODY, STEP_SPACE
 from models.planar.joints import joints_in_plane
+from models.planar.recording import M_ROAD_TIME, MEMORY
 from models.planar.space import STATE, PlanarSpace
 from models.planar.stepping import (
-    M_ROAD_TIME,
-    MEMORY,
     PlanarMotion,
     PlanarSettings,
     empty_loads,

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from mcstudy import config
-from mcstudy.config import SampledStudy, Study, load_study
+from mcstudy.config import CommonStudy, ModelComparison, SampledStudy, load_study
 from mcstudy.errors import UserError
 from mcstudy.inputs import Distribution
 from mcstudy.measured import HEADER, Measured
@@ -30,7 +30,7 @@ class ModelChoice:
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     fixed: Mapping[str, float] = field(default_factory=dict)
     uncertain: Mapping[str, Distribution] = field(default_factory=dict)
-    study: Study | None = None
+    study: CommonStudy | None = None
     text: str = ""
 
 
@@ -57,7 +57,10 @@ def choose_model(data: Measured, file: Path | None) -> ModelChoice:
     fixed: dict[str, float] = {}
     study, text = None, ""
     if file is not None:
-        study = load_study(file)
+        chosen = load_study(file)
+        if isinstance(chosen, ModelComparison):
+            raise UserError(f"{file}: a model-comparison has several models; give a study of one")
+        study = chosen
         text = file.read_text(encoding="utf-8")
         if study.model.name != header.model:
             raise UserError(

@@ -16,7 +16,8 @@ from mcstudy.injury.functions import RiskFunction
 from mcstudy.schema import AS_IT_STANDS, HEAD, REFERENCE
 from mcstudy.statistics import Estimate, between_replicates
 from models.protocol import Model
-from studies.injury.cells import BATCHES, batch_of, fronts_of
+from studies.cells import BATCHES, batch_of
+from studies.injury.cells import fronts_of
 from studies.injury.speed import describe_speed
 
 Array = NDArray[np.float64]

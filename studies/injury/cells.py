@@ -3,16 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numpy as np
-import pandas as pd
-from numpy.typing import NDArray
-
 from mcstudy.config import InjuryStudy, MonteCarloStudy
-from mcstudy.results import ResultsFolder
 from mcstudy.schema import AS_IT_STANDS, REFERENCE, Front, Report, Scenario
-
-BATCHES = 20
-"""Parts of an independent sample between which intervals are taken (assumed)."""
 
 
 @dataclass(frozen=True)
@@ -24,9 +16,10 @@ class Cell:
     study: MonteCarloStudy
     changes: Scenario
 
-    def folder(self, study_folder: ResultsFolder) -> ResultsFolder:
-        """Return the cell's own folder."""
-        return ResultsFolder(study_folder.path / "cells" / self.scenario / self.front)
+    @property
+    def name(self) -> str:
+        """Scenario and front, which name the cell's folder."""
+        return f"{self.scenario}/{self.front}"
 
 
 def cells_of(study: InjuryStudy) -> Iterator[Cell]:
@@ -52,12 +45,3 @@ def cells_of(study: InjuryStudy) -> Iterator[Cell]:
 def fronts_of(study: InjuryStudy) -> dict[str, Front]:
     """Return the car fronts: those of the study, or the model's own."""
     return study.fronts or {"car": Front()}
-
-
-def batch_of(study: InjuryStudy, part: pd.DataFrame) -> NDArray[np.int64]:
-    """Return the independent part of the design that each run belongs to, (n,).
-
-    Replicates are such parts; of independent runs any are, so they are cut into twenty.
-    """
-    size = study.design.size if study.design.size > 1 else max(1, study.design.n // BATCHES)
-    return part["run"].to_numpy(dtype=np.int64) // size

@@ -12,7 +12,7 @@ from mcstudy import seeds
 from mcstudy.config import InjuryStudy
 from mcstudy.figures.style import words
 from mcstudy.schema import REFERENCE
-from studies.injury.cells import batch_of
+from studies.cells import batch_of
 
 Array = NDArray[np.float64]
 

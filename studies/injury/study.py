@@ -8,22 +8,19 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from mcstudy import config, designs
+from mcstudy import config
 from mcstudy.config import InjuryStudy, load_study
 from mcstudy.errors import UserError
 from mcstudy.injury.functions import RiskFunction, risk_function
-from mcstudy.progress import say
-from mcstudy.results import ResultsFolder, digest
+from mcstudy.results import ResultsFolder
 from models.protocol import Model
-from studies.execution import judge_runs, load_study_model, publish, run_rows
+from studies.cells import PreparedCell, cell_folder, cell_runs, run_cells
+from studies.execution import judge_runs, load_study_model, publish
 from studies.injury.analysis import analyse, outcomes_of
 from studies.injury.cells import Cell, cells_of
 from studies.injury.report import draw, sections_of
 from studies.risk_curve import CASES
-
-Array = NDArray[np.float64]
 
 
 def run_injury(
@@ -55,42 +52,8 @@ def run_injury(
         If too many runs failed.
     """
     prepared = [_prepare(study, cell, folder) for cell in cells_of(study)]
-    n = study.design.n
-    manifest: dict[str, Any] = {
-        "format": "mcstudy-results/1",
-        "study": study.name,
-        "kind": study.kind,
-        "seed": study.seed,
-        "design": {
-            "method": study.design.method,
-            "n": n * len(prepared),
-            "cells": [f"{cell.scenario}/{cell.front}" for cell, _, _ in prepared],
-        },
-        "finished": False,
-    }
     with folder.open_for_writing():
-        folder.write_text("study.toml", text)
-        folder.write_json("manifest.json", manifest)
-        digests, counts = {}, pd.Series(dtype=int)
-        for cell, model, columns in prepared:
-            say(f"{cell.scenario}, {cell.front}:", quiet=quiet)
-            inner = cell.folder(folder)
-            fixed = cell.study.fixed | cell.changes.fixed
-            with inner.open_for_writing():
-                runs = run_rows(
-                    cell.study.model_copy(update={"fixed": fixed}), model, columns, inner,
-                    design={"method": study.design.method, "n": n,
-                            "replicate_size": study.design.size},
-                    replicate=np.arange(n) // study.design.size, workers=workers, quiet=quiet,
-                )  # fmt: skip
-            digests[f"{cell.scenario}/{cell.front}"] = digest(runs)
-            counts = counts.add(runs["status"].value_counts(), fill_value=0)
-        manifest |= {
-            "counts": {str(k): int(v) for k, v in counts.items()},
-            "digests": digests,
-            "finished": True,
-        }
-        folder.write_json("manifest.json", manifest)
+        run_cells(study, text, folder, prepared, workers=workers, quiet=quiet)
         return build_report(folder)
 
 
@@ -111,13 +74,7 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
     functions = check_functions(study, model)
     frames = []
     for cell in cells_of(study):
-        runs = cell.folder(folder).runs()
-        runs = runs[runs["run"] < study.design.n]
-        if len(runs) < study.design.n:
-            raise UserError(
-                f"{cell.folder(folder).path}: {len(runs)} of {study.design.n} runs are done; run "
-                "the study again to go on"
-            )
+        runs = cell_runs(folder, cell.name, study.design.n)
         frames.append(runs.assign(scenario=cell.scenario, front=cell.front))
     runs = pd.concat(frames, ignore_index=True)
     ended, complete = judge_runs(study, model, runs)
@@ -168,9 +125,7 @@ def check_functions(study: InjuryStudy, model: Model) -> dict[str, RiskFunction]
     return found
 
 
-def _prepare(
-    study: InjuryStudy, cell: Cell, folder: ResultsFolder
-) -> tuple[Cell, Model, dict[str, Array]]:
+def _prepare(study: InjuryStudy, cell: Cell, folder: ResultsFolder) -> PreparedCell:
     """Return a cell with its model and the values of every input.
 
     Raises
@@ -181,14 +136,12 @@ def _prepare(
     try:
         model = load_study_model(cell.study)
         check_functions(study, model)
-        design = study.design
-        uniforms = designs.draw(design.method, design.n, design.size, len(study.inputs), study.seed)
-        columns = config.map_inputs(cell.study, model, uniforms)
+        columns = config.sample_inputs(cell.study, model)
         fixed = cell.study.model_copy(update={"fixed": cell.changes.fixed})
         for name, value in config.fixed_values(fixed, model).items():
-            columns[name] = np.full(design.n, value)
+            columns[name] = np.full(study.design.n, value)
         merged = cell.study.model_copy(update={"fixed": cell.study.fixed | cell.changes.fixed})
-        cell.folder(folder).check_same_study(config.numbers_digest(merged, model))
+        cell_folder(folder, cell.name).check_same_study(config.numbers_digest(merged, model))
     except UserError as error:
         raise UserError(f"scenario {cell.scenario}, front {cell.front}: {error}") from None
-    return cell, model, columns
+    return PreparedCell(cell.name, merged, model, columns)

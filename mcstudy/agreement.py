@@ -1,0 +1,229 @@
+"""How far two methods agree on the same inputs, and how much of the spread is the method.
+
+Every input row is run by every method, so the method is a categorical factor that is crossed with
+all other inputs, and the variance of an output splits exactly into three shares: the method alone,
+the inputs alone, and what both do together.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from mcstudy import seeds
+from mcstudy.statistics import REACH, Estimate, between_replicates
+
+Array = NDArray[np.float64]
+Parts = NDArray[np.int64]
+
+BINS = 20
+"""Bins of equal count in which what two methods disagree over is averaged along an input."""
+DUMMIES = 20
+"""Dummies whose best draws the noise line: one input in twenty passes it by chance."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How a method's values go with a reference method's on the same inputs.
+
+    Attributes
+    ----------
+    pairs : runs with a value of both.
+    correlation, rank_correlation, concordance : Pearson's, Spearman's and Lin's coefficient.
+    bias : mean of method minus reference. spread : standard deviation of that difference.
+    lower, upper : limits of agreement, between which 95 % of normal differences lie.
+    outside : share of the differences beyond them.
+    slope : by which the difference grows with the mean of both.
+    """
+
+    pairs: int
+    correlation: Estimate
+    rank_correlation: Estimate
+    concordance: Estimate
+    bias: Estimate
+    spread: Estimate
+    lower: Estimate
+    upper: Estimate
+    outside: float
+    slope: Estimate
+
+
+@dataclass(frozen=True)
+class VarianceSplit:
+    """Shares of an output's variance over methods, equally weighted, and inputs; they sum to 1.
+
+    Attributes
+    ----------
+    method : of the methods' means. inputs : of the mean over the methods. together : of what the
+        methods make of the inputs differently.
+    total : the variance itself.
+    """
+
+    method: Estimate
+    inputs: Estimate
+    together: Estimate
+    total: float
+
+
+def compare(reference: Array, method: Array, parts: Parts) -> Agreement:
+    """Return how a method agrees with a reference.
+
+    Parameters
+    ----------
+    reference, method : (n,) finite values on the same inputs.
+    parts : (n,) independent part of the design that each run belongs to.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than three pairs.
+
+    Notes
+    -----
+    Limits of agreement by J. M. Bland and D. G. Altman, Lancet 327 (1986); concordance by
+    L. I. Lin, Biometrics 45 (1989). Intervals are t intervals between the parts, of correlations on
+    Fisher's scale.
+    """
+    if reference.size < 3:
+        raise ValueError(f"a comparison takes three pairs or more, given {reference.size}")
+    both = np.stack([reference, method], axis=1)
+
+    def known(statistic: Callable[[Array], float]) -> Estimate:
+        return _between(statistic, both, parts)
+
+    def correlated(statistic: Callable[[Array], float]) -> Estimate:
+        found = _between(lambda p: float(np.arctanh(_inside(statistic(p)))), both, parts)
+        return Estimate(statistic(both), float(np.tanh(found.low)), float(np.tanh(found.high)))
+
+    lower, upper = known(lambda p: _limit(p, -REACH)), known(lambda p: _limit(p, REACH))
+    difference = method - reference
+    outside = (difference < lower.value) | (difference > upper.value)
+    return Agreement(
+        pairs=int(reference.size),
+        correlation=correlated(_pearson),
+        rank_correlation=correlated(_spearman),
+        concordance=correlated(_concordance),
+        bias=known(lambda p: float(np.mean(p[:, 1] - p[:, 0]))),
+        spread=known(lambda p: float(np.std(p[:, 1] - p[:, 0], ddof=1))),
+        lower=lower,
+        upper=upper,
+        outside=float(outside.mean()),
+        slope=known(_slope),
+    )
+
+
+def split_variance(values: Array, parts: Parts) -> VarianceSplit:
+    """Return the variance split of an output.
+
+    Parameters
+    ----------
+    values : (n, methods), finite: every input row run by every method.
+    parts : (n,) independent part of the design that each row belongs to.
+
+    Notes
+    -----
+    With ``Y(m, x)``: ``V = Var_m(E_x Y) + Var_x(E_m Y) + rest``. The spread of the methods' means
+    is corrected for the sampling of the inputs, and an estimate below zero is zero.
+    """
+    total = float(np.sum(_components(values)))
+
+    def share(k: int) -> Estimate:
+        def statistic(part: Array) -> float:
+            components = _components(part)
+            whole = float(components.sum())
+            return float(components[k]) / whole if whole > 0.0 else np.nan
+
+        found = _between(statistic, values, parts)
+        return Estimate(found.value, max(found.low, 0.0), min(found.high, 1.0))
+
+    return VarianceSplit(share(0), share(1), share(2), total)
+
+
+def breaking_inputs(
+    reference: Array, method: Array, inputs: Array, seed: int
+) -> tuple[Array, float]:
+    """Return what the rank correlation gains if an input's disagreement is taken out.
+
+    Parameters
+    ----------
+    reference, method : (n,) finite. inputs : (n, d). seed : of the dummies.
+
+    Returns
+    -------
+    gains : (d,) rank correlation with the mean difference of ranks along each input taken out,
+        less the one as it is.
+    noise : the largest gain of twenty dummies.
+    """
+    one, two = stats.rankdata(reference), stats.rankdata(method)
+    rng = seeds.generator(seed, seeds.AGREEMENT)
+    columns = np.column_stack([inputs, rng.random((reference.size, DUMMIES))])
+    plain = float(np.corrcoef(one, two)[0, 1])
+    gains = np.array([_without(one, two, column) - plain for column in columns.T])
+    d = inputs.shape[1]
+    return gains[:d], float(gains[d:].max())
+
+
+def _without(one: Array, two: Array, column: Array) -> float:
+    """Return the correlation with the mean difference along a column taken out."""
+    order = np.argsort(column, kind="stable")
+    taken = np.empty_like(two)
+    for part in np.array_split(order, BINS):
+        taken[part] = two[part] - (two[part] - one[part]).mean()
+    return float(np.corrcoef(one, taken)[0, 1])
+
+
+def _components(values: Array) -> Array:
+    """Return the variances (3,): of the method, of the inputs, of both together."""
+    n = len(values)
+    within = float(np.mean(values.var(axis=1)))
+    means = values.mean(axis=0)
+    of_inputs = float(np.var(values.mean(axis=1), ddof=1))
+    # Of the spread of the means a share 1/n of the joint part is sampling.
+    spread = float(np.var(means))
+    together = max((within - spread) * n / (n - 1), 0.0)
+    of_method = max(spread - together / n, 0.0)
+    return np.array([of_method, of_inputs, together])
+
+
+def _between(statistic: Callable[[Array], float], values: Array, parts: Parts) -> Estimate:
+    held = [values[parts == part] for part in np.unique(parts)]
+    estimates = np.array([statistic(part) for part in held if len(part) > 2])
+    return between_replicates(estimates[np.isfinite(estimates)], statistic(values))
+
+
+def _inside(value: float) -> float:
+    """Return a correlation that Fisher's transform can take."""
+    return float(np.clip(value, -1.0 + 1e-12, 1.0 - 1e-12))
+
+
+def _pearson(pair: Array) -> float:
+    if np.ptp(pair[:, 0]) == 0.0 or np.ptp(pair[:, 1]) == 0.0:
+        return np.nan
+    return float(np.corrcoef(pair[:, 0], pair[:, 1])[0, 1])
+
+
+def _spearman(pair: Array) -> float:
+    return _pearson(np.stack([stats.rankdata(column) for column in pair.T], axis=1))
+
+
+def _concordance(pair: Array) -> float:
+    one, two = pair[:, 0], pair[:, 1]
+    scale = one.var() + two.var() + (one.mean() - two.mean()) ** 2
+    if scale == 0.0:
+        return np.nan
+    return float(2.0 * np.mean((one - one.mean()) * (two - two.mean())) / scale)
+
+
+def _limit(pair: Array, reach: float) -> float:
+    difference = pair[:, 1] - pair[:, 0]
+    return float(difference.mean() + reach * difference.std(ddof=1))
+
+
+def _slope(pair: Array) -> float:
+    middle, difference = pair.mean(axis=1), pair[:, 1] - pair[:, 0]
+    spread = float(middle.var())
+    if spread == 0.0:
+        return np.nan
+    return float(np.mean((middle - middle.mean()) * (difference - difference.mean())) / spread)

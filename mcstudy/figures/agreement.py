@@ -1,0 +1,195 @@
+"""How two methods agree: pairs, limits of agreement, what the spread is made of, what breaks it."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from mcstudy.figures import style
+
+Array = NDArray[np.float64]
+
+_SHARES = {
+    "inputs": ("inputs alone", style.BLUE),
+    "together": ("method and inputs together", style.SKY),
+    "method": ("method alone", style.ORANGE),
+}
+_BINS = 12
+
+
+def draw_pairs(
+    values: Mapping[str, Array],
+    units: Mapping[str, str],
+    labels: tuple[str, str],
+    found: Mapping[str, Mapping[str, Any]],
+) -> Figure:
+    """Return every run by two methods, one against the other, and below the limits of agreement.
+
+    Parameters
+    ----------
+    values : (n, 2) by output. units : by output. labels : of the two methods.
+    found : agreement by output, as in the analysis.
+    """
+    with style.styled():
+        figure = style.new_figure(4.4 * len(values), 7.4)
+        axes = figure.subplots(2, len(values), squeeze=False)
+        for k, (name, pair) in enumerate(values.items()):
+            held = pair[np.isfinite(pair).all(axis=1)]
+            _scatter(axes[0, k], held, labels, found[name])
+            axes[0, k].set_title(style.words(name))
+            for axis, label in (("x", labels[0]), ("y", labels[1])):
+                unit = style.label(name, units[name])
+                axes[0, k].set(**{f"{axis}label": f"{label}: {unit}"})
+            _limits(axes[1, k], held, found[name])
+            unit = style.bracketed(units[name])
+            axes[1, k].set_xlabel(f"mean of both {unit}")
+            axes[1, k].set_ylabel(f"{labels[1]} minus {labels[0]} {unit}")
+        return figure
+
+
+def _scatter(axes: Axes, pair: Array, labels: tuple[str, str], found: Mapping[str, Any]) -> None:
+    axes.scatter(pair[:, 0], pair[:, 1], s=7, color=style.BLUE, alpha=0.35, linewidths=0)
+    low, high = np.quantile(pair, [0.002, 0.998])
+    reach = 0.06 * (high - low)
+    ends = (low - reach, high + reach)
+    axes.plot(ends, ends, color="black", linewidth=1.0, linestyle="--", label="equal")
+    axes.set(xlim=ends, ylim=ends, aspect="equal")
+    rank = found["rank_correlation"]
+    text = f"rank correlation {_spanned(rank)}"
+    axes.plot([], [], linestyle="none", label=text)
+    axes.legend(loc="upper left", fontsize=8, framealpha=0.9, handlelength=1.2)
+
+
+def _spanned(estimate: Mapping[str, Any]) -> str:
+    value, low, high = (estimate[key] for key in ("value", "low", "high"))
+    if low is None or high is None:
+        return f"{value:.2f}"
+    return f"{value:.2f} ({low:.2f} to {high:.2f})"
+
+
+def _limits(axes: Axes, pair: Array, found: Mapping[str, Any]) -> None:
+    difference = pair[:, 1] - pair[:, 0]
+    axes.scatter(pair.mean(axis=1), difference, s=7, color=style.BLUE, alpha=0.35, linewidths=0)
+    for key, label, line in (
+        ("bias", "mean difference", "-"),
+        ("upper", "95 % limits of agreement", "--"),
+        ("lower", None, "--"),
+    ):
+        entry = found[key]
+        axes.axhline(entry["value"], color=style.RED, linewidth=1.4, linestyle=line, label=label)
+        if entry["low"] is not None and entry["high"] is not None:
+            axes.axhspan(entry["low"], entry["high"], color=style.RED, alpha=0.12, linewidth=0)
+    axes.axhline(0.0, color="black", linewidth=0.8)
+    low, high = np.quantile(difference, [0.002, 0.998])
+    span = max(high, found["upper"]["value"], 0.0) - min(low, found["lower"]["value"], 0.0)
+    axes.set_ylim(
+        min(low, found["lower"]["value"], 0.0) - 0.08 * span,
+        max(high, found["upper"]["value"], 0.0) + 0.28 * span,
+    )
+    axes.legend(loc="upper left", fontsize=8, framealpha=0.9)
+
+
+def draw_variance(split: Mapping[str, Mapping[str, Any]]) -> Figure:
+    """Return the shares of each output's variance: inputs, method, both together.
+
+    Parameters
+    ----------
+    split : ``method``, ``inputs`` and ``together`` (value, low, high) by output.
+    """
+    with style.styled():
+        figure = style.new_figure(7.2, 0.62 * len(split) + 1.5)
+        axes = figure.subplots()
+        places = np.arange(len(split))[::-1]
+        left = np.zeros(len(split))
+        for key, (label, colour) in _SHARES.items():
+            shares = np.array([entry[key]["value"] for entry in split.values()])
+            axes.barh(places, shares, 0.62, left=left, color=colour, label=label)
+            for place, start, share in zip(places, left, shares, strict=True):
+                if share >= 0.045:
+                    axes.text(
+                        start + 0.5 * share, place, f"{100.0 * share:.0f} %", ha="center",
+                        va="center", fontsize=9, color="white" if colour == style.BLUE else "black",
+                    )  # fmt: skip
+            left += shares
+        axes.set_yticks(places, [style.words(name) for name in split])
+        axes.tick_params(axis="y", length=0)
+        axes.set(xlim=(0.0, 1.0), xlabel="share of the variance over methods and inputs [–]")
+        axes.grid(visible=False, axis="y")
+        figure.legend(loc="outside upper center", ncols=3, fontsize=9)
+        return figure
+
+
+def draw_breaking(breaking: Mapping[str, Mapping[str, Any]]) -> Figure:
+    """Return by how much the rank correlation rises without an input's disagreement.
+
+    Parameters
+    ----------
+    breaking : ``gains`` by input and ``noise`` by output.
+    """
+    count = len(next(iter(breaking.values()))["gains"])
+    with style.styled():
+        figure = style.new_figure(4.3 * len(breaking), 0.27 * count + 1.5)
+        row = figure.subplots(1, len(breaking), squeeze=False)[0]
+        for axes, (name, entry) in zip(row, breaking.items(), strict=True):
+            order = sorted(entry["gains"], key=lambda k: entry["gains"][k])
+            gains = [entry["gains"][key] for key in order]
+            colours = [style.BLUE if gain > entry["noise"] else "#B9C6CF" for gain in gains]
+            axes.barh(np.arange(count), gains, 0.66, color=colours)
+            axes.axvline(entry["noise"], color="black", linestyle="--", linewidth=1.0,
+                         label="noise line (dummies)")  # fmt: skip
+            axes.axvline(0.0, color="black", linewidth=0.8)
+            axes.set_yticks(np.arange(count), [style.words(key) for key in order])
+            axes.tick_params(axis="y", length=0)
+            axes.grid(visible=False, axis="y")
+            axes.set_title(style.words(name))
+            axes.set_xlabel("gain in rank correlation [–]")
+        handles, labels = row[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", fontsize=9)
+        return figure
+
+
+def draw_along(
+    inputs: Mapping[str, tuple[Array, str]],
+    values: Mapping[str, Array],
+    units: Mapping[str, str],
+    labels: tuple[str, str],
+) -> Figure:
+    """Return both methods along the input over which each output disagrees most.
+
+    Parameters
+    ----------
+    inputs : by output the (n,) values of the input and its axis label.
+    values : (n, 2) by output. units : by output. labels : of the two methods.
+    """
+    with style.styled():
+        figure = style.new_figure(4.4 * len(values), 3.8)
+        row = figure.subplots(1, len(values), squeeze=False)[0]
+        for axes, (name, pair) in zip(row, values.items(), strict=True):
+            x, label = inputs[name]
+            held = np.isfinite(pair).all(axis=1)
+            for k, colour in enumerate((style.BLUE, style.ORANGE)):
+                middle, low, centre, high = _bands(x[held], pair[held, k])
+                axes.plot(middle, centre, "o-", color=colour, markersize=3.5,
+                          label=f"{labels[k]}, median")  # fmt: skip
+                axes.fill_between(middle, low, high, color=colour, alpha=0.18, linewidth=0)
+            axes.set(xlabel=label, ylabel=style.label(name, units[name]))
+            axes.xaxis.set_major_locator(MaxNLocator(5))
+            low, high = axes.get_ylim()
+            axes.set_ylim(low, high + 0.22 * (high - low))
+            axes.legend(loc="upper left", fontsize=8, framealpha=0.9)
+        return figure
+
+
+def _bands(x: Array, y: Array) -> tuple[Sequence[float], ...]:
+    """Return the middle of bins of equal count, and the quartiles and median of y in each."""
+    parts = np.array_split(np.argsort(x, kind="stable"), _BINS)
+    columns = [
+        (float(np.median(x[part])), *np.quantile(y[part], [0.25, 0.5, 0.75]).tolist())
+        for part in parts
+        if part.size
+    ]
+    return tuple(zip(*columns, strict=True))

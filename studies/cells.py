@@ -1,0 +1,123 @@
+"""Studies of several cells: the same draws through every cell, each in a folder of its own."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mcstudy.config import InjuryStudy, ModelComparison, MonteCarloStudy
+from mcstudy.errors import StudyError, UserError
+from mcstudy.progress import say
+from mcstudy.results import ResultsFolder, digest
+from models.protocol import Model
+from studies.execution import run_rows
+
+Array = NDArray[np.float64]
+
+BATCHES = 20
+"""Parts of an independent sample between which intervals are taken (assumed)."""
+
+
+@dataclass(frozen=True)
+class PreparedCell:
+    """A cell ready to run: its name, which is its folder's, study, model and input values."""
+
+    name: str
+    study: MonteCarloStudy
+    model: Model
+    columns: dict[str, Array]
+
+
+def cell_folder(folder: ResultsFolder, name: str) -> ResultsFolder:
+    """Return the folder of a cell."""
+    return ResultsFolder(folder.path / "cells" / name)
+
+
+def run_cells(
+    study: InjuryStudy | ModelComparison,
+    text: str,
+    folder: ResultsFolder,
+    cells: Sequence[PreparedCell],
+    *,
+    workers: int,
+    quiet: bool,
+) -> None:
+    """Run what is missing of all cells and write the study's manifest.
+
+    Parameters
+    ----------
+    study, text : the study and its file as written. folder : open for writing.
+    cells : in the order in which they are run.
+    workers : processes, -1 for one a core. quiet : no progress line.
+
+    Raises
+    ------
+    StudyError
+        If too many runs of a cell failed, or the workers are lost.
+    """
+    n, size = study.design.n, study.design.size
+    manifest: dict[str, Any] = {
+        "format": "mcstudy-results/1",
+        "study": study.name,
+        "kind": study.kind,
+        "seed": study.seed,
+        "design": {
+            "method": study.design.method,
+            "n": n * len(cells),
+            "cells": [cell.name for cell in cells],
+        },
+        "finished": False,
+    }
+    folder.write_text("study.toml", text)
+    folder.write_json("manifest.json", manifest)
+    digests, counts = {}, pd.Series(dtype=int)
+    for cell in cells:
+        say(f"{cell.name.replace('/', ', ')}:", quiet=quiet)
+        inner = cell_folder(folder, cell.name)
+        try:
+            with inner.open_for_writing():
+                runs = run_rows(
+                    cell.study, cell.model, cell.columns, inner,
+                    design={"method": study.design.method, "n": n, "replicate_size": size},
+                    replicate=np.arange(n) // size, workers=workers, quiet=quiet,
+                )  # fmt: skip
+        except StudyError as error:
+            raise StudyError(f"{cell.name}: {error}") from None
+        digests[cell.name] = digest(runs)
+        counts = counts.add(runs["status"].value_counts(), fill_value=0)
+    manifest |= {
+        "counts": {str(k): int(v) for k, v in counts.items()},
+        "digests": digests,
+        "finished": True,
+    }
+    folder.write_json("manifest.json", manifest)
+
+
+def cell_runs(folder: ResultsFolder, name: str, n: int) -> pd.DataFrame:
+    """Return the first n runs of a cell.
+
+    Raises
+    ------
+    UserError
+        If not all of them are done.
+    """
+    inner = cell_folder(folder, name)
+    runs = inner.runs()
+    runs = runs[runs["run"] < n]
+    if len(runs) < n:
+        raise UserError(
+            f"{inner.path}: {len(runs)} of {n} runs are done; run the study again to go on"
+        )
+    return runs
+
+
+def batch_of(study: InjuryStudy | ModelComparison, runs: pd.DataFrame) -> NDArray[np.int64]:
+    """Return the independent part of the design that each run belongs to, (n,).
+
+    Replicates are such parts; of independent runs any are, so they are cut into twenty.
+    """
+    size = study.design.size if study.design.size > 1 else max(1, study.design.n // BATCHES)
+    return runs["run"].to_numpy(dtype=np.int64) // size

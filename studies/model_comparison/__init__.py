@@ -1,0 +1,1 @@
+"""The comparison of models: the same inputs through two or more methods."""

@@ -1,0 +1,171 @@
+"""Every number of a model comparison."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mcstudy import config, units
+from mcstudy.agreement import breaking_inputs, compare, split_variance
+from mcstudy.config import ModelComparison
+from mcstudy.errors import StudyError, UserError
+from mcstudy.failures import locate_failures
+from mcstudy.results import check_failures, status_counts
+from mcstudy.sensitivity.given_data import FEWEST_RUNS, measure_given_data
+from mcstudy.statistics import Estimate
+from models.protocol import Model, complete_status
+from studies.cells import batch_of
+
+Array = NDArray[np.float64]
+
+FEWEST_PAIRS = 20
+"""Runs with a value by both models below which they are not compared (assumed)."""
+MOST_APART = 5
+"""Runs that are listed where two models differ most."""
+
+
+def analyse(
+    study: ModelComparison,
+    models: Mapping[str, Model],
+    runs: Mapping[str, pd.DataFrame],
+    nominal: Mapping[str, Mapping[str, Any]],
+    outputs: list[str],
+) -> dict[str, Any]:
+    """Return every number that the report prints.
+
+    Parameters
+    ----------
+    study : ModelComparison. models, runs, nominal : by label.
+    outputs : that are compared.
+
+    Raises
+    ------
+    StudyError
+        If more runs of a model failed than the study allows, or no output can be compared.
+    """
+    everything = pd.concat([part.assign(model=label) for label, part in runs.items()])
+    everything = everything.reset_index(drop=True)
+    complete = pd.Series(False, index=everything.index)
+    for label, model in models.items():
+        counts = status_counts(runs[label])
+        try:
+            check_failures(counts, set(counts) - complete_status(model), study.max_failure_rate)
+        except StudyError as error:
+            raise StudyError(f"models.{label}: {error}") from None
+        own = everything["model"] == label
+        complete |= own & everything["status"].isin(complete_status(model))
+    first = next(iter(models))
+    inputs = runs[first][list(study.inputs)]
+    ignored = {
+        label: {i.name: i.ignored for i in model.inputs if i.ignored and i.name in study.inputs}
+        for label, model in models.items()
+    }
+    analysis: dict[str, Any] = {
+        "kind": study.kind,
+        "runs": len(everything),
+        "status": status_counts(everything),
+        "failures": locate_failures(everything[list(study.inputs)], ~complete.to_numpy(dtype=bool)),
+        "models": {
+            label: {"name": model.name, "version": model.version, "ignored": ignored[label],
+                    "status": status_counts(runs[label])}
+            for label, model in models.items()
+        },
+        "nominal": {label: dict(entry["outputs"]) for label, entry in nominal.items()},
+        "published": published_methods(study, models[first]),
+        "outputs": {},
+    }  # fmt: skip
+    parts = batch_of(study, runs[first])
+    unit_of = {item.name: item.unit for item in models[first].outputs}
+    for name in outputs:
+        values = pd.DataFrame(
+            {
+                label: part[name].where(part["status"].isin(complete_status(models[label]))).array
+                for label, part in runs.items()
+            }
+        )
+        held = values.notna().all(axis=1).to_numpy()
+        entry: dict[str, Any] = {"unit": unit_of[name], "rows": int(held.sum())}
+        if held.sum() >= FEWEST_PAIRS:
+            table = values.to_numpy(dtype=float)
+            entry["variance"] = asdict(split_variance(table[held], parts[held]))
+            entry["method_sd"] = float(np.sqrt(table[held].var(axis=1, ddof=1).mean()))
+            entry["spread"] = {label: float(values[label].std()) for label in models}
+            entry["pairs"] = {
+                f"{one}/{two}": _pair(study, table[:, [i, j]], inputs, parts)
+                | {"unit": unit_of[name]}
+                for (i, one), (j, two) in combinations(enumerate(models), 2)
+            }
+        analysis["outputs"][name] = entry
+    analysis["compared"] = [name for name in outputs if "pairs" in analysis["outputs"][name]]
+    if not analysis["compared"]:
+        raise StudyError(
+            f"{', '.join(outputs)}: fewer than {FEWEST_PAIRS} runs have a value by every model"
+        )
+    return analysis
+
+
+def published_methods(study: ModelComparison, model: Model) -> dict[str, Any]:
+    """Return mean and standard deviation over the published simulations, by output in SI units.
+
+    Raises
+    ------
+    UserError
+        If an output or a unit of a table does not fit the model.
+    """
+    si = {item.name: item.unit for item in model.outputs}
+    found = {}
+    for k, table in enumerate(study.tables):
+        config.check_outputs(list(table.units), model, f"tables[{k}].units")
+        for name, given in table.units.items():
+            rows = [row.values[name] for row in table.rows
+                    if row.kind == "simulated" and name in row.values]  # fmt: skip
+            if len(rows) < 2:
+                continue
+            try:
+                values = np.array(rows) * units.factor(given, si[name])
+            except ValueError as error:
+                raise UserError(f"tables[{k}].units.{name}: {error}") from None
+            found[name] = {"unit": si[name], "methods": len(rows), "mean": float(values.mean()),
+                           "sd": float(values.std(ddof=1))}  # fmt: skip
+    return found
+
+
+def _pair(
+    study: ModelComparison, values: Array, inputs: pd.DataFrame, parts: NDArray[np.int64]
+) -> dict[str, Any]:
+    """Return how two models agree, over which inputs they do not, and where most."""
+    held = np.isfinite(values).all(axis=1)
+    one, two = values[held].T
+    table = inputs[held].to_numpy(dtype=float)
+    found: dict[str, Any] = asdict(compare(one, two, parts[held]))
+    gains, noise = breaking_inputs(one, two, table, study.seed)
+    found["breaking"] = {
+        "gains": dict(zip(inputs.columns, gains.tolist(), strict=True)),
+        "noise": noise,
+    }
+    difference = two - one
+    if held.sum() >= FEWEST_RUNS:
+        given = measure_given_data(table, difference, study.seed)
+        shares = given.values["first_order"]
+        found["disagreement"] = {
+            "shares": {
+                name: Estimate(*shares[:, k].tolist()).as_dict()
+                for k, name in enumerate(inputs.columns)
+            },
+            "noise": given.noise["first_order"],
+        }
+    worst = np.argsort(-np.abs(difference - difference.mean()), kind="stable")[:MOST_APART]
+    runs = np.flatnonzero(held)[worst]
+    found["most_apart"] = [
+        {
+            "run": int(run),
+            "values": values[run].tolist(),
+            "inputs": {k: float(v) for k, v in inputs.iloc[int(run)].items()},
+        }
+        for run in runs
+    ]
+    return found

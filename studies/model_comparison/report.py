@@ -1,0 +1,335 @@
+"""The report of a model comparison: what the method itself is worth, in words and pictures."""
+
+from collections.abc import Mapping
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mcstudy import units
+from mcstudy.config import ModelComparison
+from mcstudy.figures import agreement, crash, style
+from mcstudy.report import Section, Table
+from mcstudy.text import capital, interval, number, quantity, unit
+from models.protocol import Model, Scene
+from studies.failure_report import failure_map, failures_said, status_table
+from studies.reconstruction import as_table, compare_with_table
+
+NAMED = 3
+"""Inputs that a sentence names, the largest."""
+
+
+def draw(
+    study: ModelComparison,
+    models: Mapping[str, Model],
+    runs: Mapping[str, pd.DataFrame],
+    nominal: Mapping[str, Mapping[str, Any]],
+    analysis: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Return the figures by file name."""
+    names = analysis["compared"]
+    unit_of = {name: analysis["outputs"][name]["unit"] for name in names}
+    figures = failure_map(analysis)
+    figures["variance"] = agreement.draw_variance(
+        {name: analysis["outputs"][name]["variance"] for name in names}
+    )
+    for one, two in combinations(study.models, 2):
+        found = {name: analysis["outputs"][name]["pairs"][f"{one}/{two}"] for name in names}
+        values = {
+            name: np.stack(
+                [runs[label][name].to_numpy(dtype=float) for label in (one, two)], axis=1
+            )
+            for name in names
+        }
+        figures[f"pairs_{one}_{two}"] = agreement.draw_pairs(values, unit_of, (one, two), found)
+        figures[f"breaking_{one}_{two}"] = agreement.draw_breaking(
+            {name: found[name]["breaking"] for name in names}
+        )
+        si = {item.name: item.unit for item in models[one].inputs}
+        along = {}
+        for name in names:
+            gains = found[name]["breaking"]["gains"]
+            key = max(gains, key=lambda k: gains[k])
+            spec = study.inputs[key]
+            shown = runs[one][key].to_numpy(dtype=float) * units.factor(si[key], spec.unit)
+            along[name] = (shown, style.label(key, spec.unit))
+        figures[f"along_{one}_{two}"] = agreement.draw_along(along, values, unit_of, (one, two))
+    for label, entry in nominal.items():
+        if "scene" in entry:
+            figures[f"kinematics_{label}"] = crash.draw_strip(
+                _scene(entry["scene"]), study.report.strip_times
+            )
+    return figures
+
+
+def sections_of(
+    study: ModelComparison,
+    models: Mapping[str, Model],
+    analysis: Mapping[str, Any],
+    figures: Mapping[str, Any],
+) -> list[Section]:
+    """Return the sections of the report."""
+    sections = [
+        Section(
+            "How much is the method",
+            [_variance_said(name, analysis["outputs"][name]) for name in analysis["compared"]],
+            [_variance_table(analysis)],
+            {"What the variance of each output is made of, the methods being equally likely: "
+             "what the inputs do alike in all of them, what the method shifts as a whole, and what "
+             "the methods make of the inputs differently.": figures["variance"]},
+        )
+    ]  # fmt: skip
+    for one, two in combinations(study.models, 2):
+        pair = f"{one}/{two}"
+        sections.append(
+            Section(
+                f"{capital(two)} against {one}",
+                [
+                    _pair_said(name, analysis["outputs"][name]["pairs"][pair], one, two)
+                    for name in analysis["compared"]
+                ],
+                [_pair_table(analysis, pair)],
+                {"Above: every set of inputs by both models. Below: their difference against their "
+                 "mean, with the mean difference and the limits between which 95 % of normal "
+                 "differences lie; shaded, 95 % intervals of the lines. The widest 0.2 % at either "
+                 "end lie outside the pictures.": figures[f"pairs_{one}_{two}"]},
+            )
+        )  # fmt: skip
+        sections.append(
+            Section(
+                f"Where {one} and {two} disagree",
+                [_breaking_said(name, analysis["outputs"][name]["pairs"][pair])
+                 for name in analysis["compared"]],
+                [_disagreement_table(analysis, pair), _apart_table(study, analysis, pair, models)],
+                {"By how much the rank correlation rises if the mean disagreement along an input "
+                 "is taken out. Grey: no more than for an input that has nothing to do with it.":
+                 figures[f"breaking_{one}_{two}"],
+                 "Both models along the input over which each output disagrees most: median and "
+                 "middle half of the runs.": figures[f"along_{one}_{two}"]},
+            )
+        )  # fmt: skip
+    pictures = {
+        f"Nominal run of {label} ({models[label].name}), in the car's frame.":
+        figures[f"kinematics_{label}"]
+        for label in study.models
+        if f"kinematics_{label}" in figures
+    }  # fmt: skip
+    sections.append(_published(study, models, analysis, pictures))
+    sections.append(
+        Section(
+            "How sure the numbers are",
+            [
+                "Run k of every model has the same inputs. Intervals are 95 % t intervals between "
+                "independent parts of the design, of correlations on Fisher's scale. They count "
+                "the sampling only: models that agree may be wrong together.",
+                *failures_said(analysis),
+            ],
+            [status_table(analysis)],
+            {"Share of failed runs in each tenth of each input.": figures["failures"]}
+            if "failures" in figures
+            else {},
+        )
+    )
+    sections.append(Section("The models", _models_said(analysis)))
+    return sections
+
+
+def summarise(analysis: Mapping[str, Any]) -> list[Any]:
+    """Return what the command line prints: the variance split and each pair's agreement."""
+    pairs = next(iter(analysis["outputs"][name]["pairs"] for name in analysis["compared"]))
+    return [
+        *(_variance_said(name, analysis["outputs"][name]) for name in analysis["compared"]),
+        *(_pair_table(analysis, pair) for pair in pairs),
+    ]
+
+
+def _scene(entry: Mapping[str, Any]) -> Scene:
+    """Return the scene that a cell keeps."""
+    plain = {key: np.asarray(entry[key], dtype=float) for key in
+             ("time", "semi_axes", "centre", "orientation", "car", "plan")}  # fmt: skip
+    outline = [np.asarray(line, dtype=float) for line in entry["outline"]]
+    return Scene(names=list(entry["names"]), outline=outline, **plain)
+
+
+def _title(name: str) -> str:
+    return capital(style.words(name))
+
+
+def _percent(entry: Mapping[str, Any]) -> str:
+    shown = [
+        "–" if entry[key] is None else f"{100.0 * entry[key]:.0f}".replace("-0", "0")
+        for key in ("value", "low", "high")
+    ]
+    return f"{shown[0]} %" if "–" in shown else f"{shown[0]} % ({shown[1]} to {shown[2]})"
+
+
+def _gain(value: float) -> str:
+    """Return a gain with two decimals, nothing where it rounds to nothing."""
+    return f"{value:.2f}".replace("-0.00", "0.00")
+
+
+def _variance_said(name: str, entry: Mapping[str, Any]) -> str:
+    split = entry["variance"]
+    return (
+        f"{_title(name)}: of its variance {_percent(split['inputs'])} is the inputs alike in all "
+        f"models, {_percent(split['method'])} the method's own shift, and "
+        f"{_percent(split['together'])} what the methods make of the inputs differently. For one "
+        f"set of inputs the methods scatter by {quantity(entry['method_sd'], entry['unit'])}."
+    )
+
+
+def _variance_table(analysis: Mapping[str, Any]) -> Table:
+    rows = []
+    for name in analysis["compared"]:
+        entry = analysis["outputs"][name]
+        split = entry["variance"]
+        rows.append(
+            [style.words(name), unit(entry["unit"]) or "–",
+             *(_percent(split[key]) for key in ("inputs", "method", "together")),
+             number(entry["method_sd"]), f"{entry['rows']:,}"]
+        )  # fmt: skip
+    head = ["output", "unit", "inputs", "method", "both together", "sd of the methods", "runs"]
+    return Table("Shares of the variance (95 %), and scatter of the methods.", head, rows)
+
+
+def _pair_said(name: str, found: Mapping[str, Any], one: str, two: str) -> str:
+    u = unit(found["unit"])
+    bias, low, high = found["bias"], found["lower"]["value"], found["upper"]["value"]
+    differs = bias["low"] is None or bias["low"] > 0.0 or bias["high"] < 0.0
+    side = "above" if bias["value"] > 0.0 else "below"
+    shift = (
+        f"{two} lies {number(abs(bias['value']))} {u} {side} {one} on average".replace("  ", " ")
+        if differs
+        else f"{two} and {one} have no clear mean difference"
+    )
+    return (
+        f"{_title(name)}: {shift}; 95 % of the differences lie between {number(low)} and "
+        f"{quantity(high, found['unit'])}. "
+        f"Rank correlation {interval(found['rank_correlation'], 2)}."
+    )
+
+
+def _pair_table(analysis: Mapping[str, Any], pair: str) -> Table:
+    rows = []
+    for name in analysis["compared"]:
+        entry = analysis["outputs"][name]
+        found = entry["pairs"][pair]
+        rows.append(
+            [style.label(name, entry["unit"]), f"{found['pairs']:,}",
+             *(interval(found[key], 2) for key in ("rank_correlation", "correlation",
+                                                   "concordance")),
+             interval(found["bias"]),
+             f"{number(found['lower']['value'])} to {number(found['upper']['value'])}"]
+        )  # fmt: skip
+    one, two = pair.split("/")
+    head = ["output", "pairs", "rank correlation", "Pearson", "concordance", "mean difference",
+            "limits"]  # fmt: skip
+    return Table(
+        f"{capital(two)} minus {one}, with 95 % intervals; limits of agreement hold 95 % of the "
+        "differences.",
+        head,
+        rows,
+    )
+
+
+def _breaking_said(name: str, found: Mapping[str, Any]) -> str:
+    gains, noise = found["breaking"]["gains"], found["breaking"]["noise"]
+    rank = found["rank_correlation"]["value"]
+    order = [key for key in sorted(gains, key=lambda k: -gains[k]) if gains[key] > noise]
+    if not order:
+        return (
+            f"{_title(name)}: no single input breaks the rank correlation of {rank:.2f}; what is "
+            "missing is scattered over all of them or lies in how they act together."
+        )
+    named = ", ".join(f"{style.words(k)} (+{gains[k]:.2f})" for k in order[:NAMED])
+    return (
+        f"{_title(name)}: the rank correlation of {rank:.2f} is broken most by {named}: so much "
+        "would it gain if both models answered to that input alike."
+    )
+
+
+def _disagreement_table(analysis: Mapping[str, Any], pair: str) -> Table:
+    names = analysis["compared"]
+    inputs = list(analysis["outputs"][names[0]]["pairs"][pair]["breaking"]["gains"])
+    rows = []
+    for key in inputs:
+        row = [style.words(key)]
+        for name in names:
+            found = analysis["outputs"][name]["pairs"][pair]
+            row.append(_gain(found["breaking"]["gains"][key]))
+            shares = found.get("disagreement", {}).get("shares")
+            row.append(_percent(shares[key]) if shares else "–")
+        rows.append(row)
+    last = ["noise line"]
+    for name in names:
+        found = analysis["outputs"][name]["pairs"][pair]
+        last.append(_gain(found["breaking"]["noise"]))
+        noise = found.get("disagreement", {}).get("noise")
+        last.append("–" if noise is None else f"{100.0 * noise:.0f} %")
+    head = ["input"]
+    for name in names:
+        head += [f"{style.words(name)}: gain", f"{style.words(name)}: share of the difference"]
+    return Table(
+        "What each input does to the rank correlation, and its first-order share of the variance "
+        "of the difference (95 %).",
+        head,
+        [*rows, last],
+    )
+
+
+def _apart_table(
+    study: ModelComparison, analysis: Mapping[str, Any], pair: str, models: Mapping[str, Model]
+) -> Table:
+    names = analysis["compared"]
+    shown = []
+    for name in names:
+        gains = analysis["outputs"][name]["pairs"][pair]["breaking"]["gains"]
+        shown += sorted(gains, key=lambda k: -gains[k])[:NAMED]
+    columns = list(dict.fromkeys(shown))
+    si = {item.name: item.unit for item in models[pair.split("/")[0]].inputs}
+    rows = []
+    for name in names:
+        for entry in analysis["outputs"][name]["pairs"][pair]["most_apart"]:
+            values = [number(value) for value in entry["values"]]
+            point = [
+                number(entry["inputs"][k] * units.factor(si[k], study.inputs[k].unit))
+                for k in columns
+            ]
+            rows.append([style.words(name), str(entry["run"]), *values, *point])
+    head = ["output", "run", *pair.split("/"),
+            *(style.label(k, study.inputs[k].unit) for k in columns)]  # fmt: skip
+    return Table("Runs that are farthest apart, beyond the mean difference.", head, rows)
+
+
+def _published(
+    study: ModelComparison,
+    models: Mapping[str, Model],
+    analysis: Mapping[str, Any],
+    pictures: Mapping[str, Any],
+) -> Section:
+    si = {item.name: item.unit for model in models.values() for item in model.outputs}
+    ours = {f"{label}, nominal": analysis["nominal"][label] for label in study.models}
+    tables = [as_table(compare_with_table(table, ours, si)) for table in study.tables]
+    lines = ["Our rows are the models' nominal runs; none of them was set up for this study."]
+    for name, entry in analysis["published"].items():
+        mine = analysis["outputs"].get(name, {}).get("method_sd")
+        said = (
+            f"{_title(name)}: the {entry['methods']} published methods scatter by "
+            f"{quantity(entry['sd'], entry['unit'])} ({100.0 * entry['sd'] / entry['mean']:.0f} % "
+            "of their mean) for one set of inputs"
+        )
+        if mine is not None:
+            said += f"; ours, over all sets of inputs, by {quantity(mine, entry['unit'])}"
+        lines.append(f"{said}.")
+    return Section("Beside the published methods", lines, tables, dict(pictures))
+
+
+def _models_said(analysis: Mapping[str, Any]) -> list[str]:
+    lines = []
+    for label, entry in analysis["models"].items():
+        line = f"{capital(label)}: model {entry['name']}, version {entry['version']}."
+        for key, reason in entry["ignored"].items():
+            line += f" It makes nothing of {style.words(key)}: {reason}."
+        lines.append(line)
+    return lines

@@ -1,0 +1,281 @@
+"""The comparison of models: headforms on two hoods, whose difference is known, and two crashes."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from headform_studies import INPUTS, without_figures
+
+from mcstudy import cli
+from mcstudy.config import load_study, parse_study
+from mcstudy.errors import StudyError, UserError
+from mcstudy.results import ResultsFolder, digest
+from models.registry import load_model
+from studies import api
+from studies.model_comparison.study import NOMINAL, build_report
+
+FACTOR = 2.0**0.75
+"""HIC15 of a straight hood goes with the stiffness to the power of 0.75."""
+TEXT = """\
+format = "mcstudy-study/1"
+kind = "model-comparison"
+name = "two_hoods"
+title = "Two <b>hoods</b> & $one$ headform"
+seed = 3
+{extra}
+[models.soft]
+name = "headform"
+options = {{ hood_curve = [[0.0, 0.0], [0.1, {soft}]], channel_class = 0.0 }}
+
+[models.stiff]
+name = "headform"
+options = {{ hood_curve = [[0.0, 0.0], [0.1, 20000.0]], channel_class = 0.0 }}
+
+[fixed]
+hood_damping = {{ value = 0.0, unit = "N s/m" }}
+friction_body_car = {{ value = 0.0 }}
+
+[design]
+n = {n}
+replicate_size = 40
+{inputs}
+[report]
+outputs = {outputs}
+
+[[tables]]
+title = "Published"
+units = {{ hic15 = "1", peak_force = "kN" }}
+rows = [
+    {{ label = "method A", values = {{ hic15 = 900, peak_force = 4.0 }} }},
+    {{ label = "method B", values = {{ hic15 = 1100, peak_force = 5.0 }} }},
+    {{ label = "test", kind = "observed", values = {{ hic15 = 5000 }} }},
+]
+"""
+
+
+def text_of(
+    n: int = 200,
+    outputs: str = '["hic15", "peak_force"]',
+    extra: str = "",
+    soft: float = 10000.0,
+    inputs: str = INPUTS,
+) -> str:
+    return TEXT.format(n=n, outputs=outputs, extra=extra, soft=soft, inputs=inputs)
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "study.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def hoods(tmp_path_factory: pytest.TempPathFactory) -> ResultsFolder:
+    base = tmp_path_factory.mktemp("hoods")
+    return api.run_study(write(base, text_of()), out=base / "out", workers=1)
+
+
+def cell(folder: ResultsFolder, label: str) -> ResultsFolder:
+    return ResultsFolder(folder.path / "cells" / label)
+
+
+def test_a_run_has_the_same_inputs_in_every_model(hoods: ResultsFolder) -> None:
+    soft, stiff = (cell(hoods, label).runs() for label in ("soft", "stiff"))
+    for name in ("run", "impact_speed", "headform_mass", "hood_force_scale"):
+        np.testing.assert_array_equal(soft[name], stiff[name])
+    assert len(soft) == 200
+
+
+def test_agreement_is_that_of_the_known_factor(hoods: ResultsFolder) -> None:
+    found = hoods.read_json("analysis.json")["outputs"]["hic15"]
+    pair, values = found["pairs"]["soft/stiff"], cell(hoods, "soft").runs()["hic15"].to_numpy()
+    assert pair["rank_correlation"]["value"] == pytest.approx(1.0, abs=1e-3)
+    assert pair["bias"]["value"] == pytest.approx((FACTOR - 1.0) * values.mean(), rel=0.01)
+    assert pair["spread"]["value"] == pytest.approx((FACTOR - 1.0) * values.std(ddof=1), rel=0.02)
+    low, high = pair["lower"]["value"], pair["upper"]["value"]
+    assert 0.5 * (low + high) == pytest.approx(pair["bias"]["value"])
+    # Y and c Y: the method's mean shift, what the inputs do alike, and by how much c stretches it.
+    mean, variance = values.mean(), values.var(ddof=1)
+    shift, stretch = 0.5 * (FACTOR - 1.0), 0.5 * (FACTOR + 1.0)
+    components = {
+        "method": shift**2 * mean**2,
+        "inputs": stretch**2 * variance,
+        "together": shift**2 * variance,
+    }
+    for key, part in components.items():
+        share = found["variance"][key]["value"]
+        assert share == pytest.approx(part / sum(components.values()), abs=0.01), key
+
+
+def test_published_methods_stand_beside_ours(hoods: ResultsFolder) -> None:
+    analysis = hoods.read_json("analysis.json")
+    published = analysis["published"]
+    assert published["hic15"] == {
+        "unit": "1", "methods": 2, "mean": 1000.0, "sd": pytest.approx(math.sqrt(2.0) * 100.0),
+    }  # fmt: skip
+    assert published["peak_force"]["mean"] == pytest.approx(4500.0)
+    for label in ("soft", "stiff"):
+        study = load_study(hoods.path / "study.toml")
+        assert not isinstance(study, list)
+        options = study.models[label].options  # type: ignore[union-attr]
+        nominal = load_model("headform", options).run({}).outputs
+        assert analysis["nominal"][label]["hic15"] == pytest.approx(nominal["hic15"])
+    report = (hoods.path / "report.html").read_text(encoding="utf-8")
+    for shown in ("method A", "method B", "test", "soft, nominal", "stiff, nominal"):
+        assert shown in report
+    assert "<b>hoods</b>" not in report
+
+
+def test_the_report_is_built_again_without_a_model(hoods: ResultsFolder) -> None:
+    before = hoods.read_json("analysis.json")
+    assert build_report(hoods) == before
+
+
+def test_figures_and_manifest_are_there(hoods: ResultsFolder) -> None:
+    names = {path.stem for path in (hoods.path / "figures").glob("*.png")}
+    assert names == {"variance", "pairs_soft_stiff", "breaking_soft_stiff", "along_soft_stiff"}
+    manifest = hoods.read_json("manifest.json")
+    assert manifest["finished"] and manifest["design"]["cells"] == ["soft", "stiff"]
+    for label in ("soft", "stiff"):
+        assert manifest["digests"][label] == digest(cell(hoods, label).runs())
+    assert hoods.progress() == (400, {"ok": 400})
+
+
+def test_a_larger_comparison_keeps_what_it_has(tmp_path: Path) -> None:
+    with without_figures():
+        out = tmp_path / "out"
+        small = api.run_study(write(tmp_path, text_of(n=120)), out=out, workers=1)
+        first = cell(small, "soft").runs()
+        larger = api.run_study(write(tmp_path, text_of(n=200)), out=out, workers=1)
+    pd.testing.assert_frame_equal(cell(larger, "soft").runs().iloc[:120], first)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"outputs": '["throw_distance"]'}, "no output 'throw_distance'"),
+        ({"inputs": INPUTS + '\n[inputs.stature]\ndistribution = "uniform"\nlow = 1.0\nhigh = 2.0'},
+         "models.soft: inputs.stature"),
+        ({"soft": -1.0}, "models.soft: model"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_said_with_its_place(
+    change: dict[str, Any], said: str, tmp_path: Path
+) -> None:
+    with pytest.raises(UserError, match=said):
+        api.run_study(write(tmp_path, text_of(**change)), out=tmp_path / "out", workers=1)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('[models.stiff]\nname = "headform"', '[models."../stiff"]\nname = "headform"', "folder"),
+        ("peak_force = ", "peak_farce = ", "tables"),
+        ('hic15 = "1"', 'hic15 = "m"', "tables"),
+        ('kind = "observed"', 'kind = "guessed"', "kind"),
+    ],
+)
+def test_a_wrong_study_file_is_one_line(old: str, new: str, said: str, tmp_path: Path) -> None:
+    text = text_of().replace(old, new)
+    assert text != text_of()
+    with pytest.raises(UserError, match=said) as error, without_figures():
+        api.run_study(write(tmp_path, text), out=tmp_path / "out", workers=1)
+    assert "\n" not in str(error.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_one_model_is_no_comparison() -> None:
+    text = text_of()
+    start, end = text.index("[models.stiff]"), text.index("[fixed]")
+    with pytest.raises(UserError, match="models"):
+        parse_study(text[:start] + text[end:])
+
+
+def test_another_model_does_not_mix_with_what_is_there(
+    hoods: ResultsFolder, tmp_path: Path
+) -> None:
+    with pytest.raises(UserError, match=r"models.soft: .*holds another study"):
+        api.run_study(write(tmp_path, text_of(soft=9000.0)), out=hoods.path, workers=1)
+
+
+def test_too_many_failures_name_the_model(tmp_path: Path) -> None:
+    # A hood of 1 N/mm: the contact lasts more than a second and every run fails.
+    text = text_of(n=40, soft=0.1)
+    with pytest.raises(StudyError, match="soft: 100"):
+        api.run_study(write(tmp_path, text), out=tmp_path / "out", workers=1)
+
+
+def test_the_command_prints_one_object(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write(tmp_path, text_of(n=120))
+    out = str(tmp_path / "out")
+    monkeypatch.setattr("sys.argv", ["mcstudy", "run", str(path), "--out", out, "--json",
+                                     "--workers", "1"])  # fmt: skip
+    with without_figures(), pytest.raises(SystemExit) as end:
+        cli.main()
+    assert end.value.code == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["analysis"]["compared"] == ["hic15", "peak_force"]
+    monkeypatch.setattr("sys.argv", ["mcstudy", "report", out])
+    with without_figures(), pytest.raises(SystemExit) as end:
+        cli.main()
+    assert end.value.code == 0
+    assert "rank" in capsys.readouterr().out
+
+
+CRASHES = """\
+format = "mcstudy-study/1"
+kind = "model-comparison"
+name = "two_crashes"
+title = "In space and in the plane"
+
+[models.spatial]
+name = "multibody"
+
+[models.planar]
+name = "planar"
+
+[design]
+n = 20
+replicate_size = 10
+
+[inputs.impact_speed]
+distribution = "uniform"
+unit = "km/h"
+low = 36.0
+high = 48.0
+
+[inputs.lateral_offset]
+distribution = "uniform"
+low = -0.5
+high = 0.5
+unit = "m"
+"""
+
+
+def test_two_crash_models_are_compared_and_drawn_with_any_workers(tmp_path: Path) -> None:
+    path = write(tmp_path, CRASHES)
+    folder = api.run_study(path, out=tmp_path / "one", workers=1)
+    with without_figures():
+        again = api.run_study(path, out=tmp_path / "two", workers=2)
+    assert (
+        folder.read_json("manifest.json")["digests"] == again.read_json("manifest.json")["digests"]
+    )
+    analysis = folder.read_json("analysis.json")
+    assert analysis["compared"] == ["hic15", "throw_distance", "wad"]
+    assert list(analysis["models"]["planar"]["ignored"]) == ["lateral_offset"]
+    names = {file.stem for file in (folder.path / "figures").glob("*.png")}
+    assert {"kinematics_spatial", "kinematics_planar"} <= names
+    assert cell(folder, "planar").read_json(NOMINAL)["scene"]["names"][0] == "hip"
+    # A planar study of one model goes on where it stopped, with the same bits.
+    runs = cell(folder, "planar").runs()
+    cell(folder, "planar").compact(runs.iloc[:13])
+    with without_figures():
+        resumed = api.run_study(path, out=folder.path, workers=2)
+    pd.testing.assert_frame_equal(cell(resumed, "planar").runs(), runs)

@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install study diagnose-demo case test check benchmark gallery calibrate lock clean
+.PHONY: help install study diagnose-demo case test test-slow check benchmark gallery calibrate lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 24
@@ -30,6 +30,9 @@ case: install  ## run the nominal case only
 
 test: install  ## run the tests, on all cores
 	$(BIN)/python -m pytest -n auto --dist loadfile
+
+test-slow: install  ## run the slow tier of the tests
+	$(BIN)/python -m pytest -n auto --dist load -m slow
 
 check: install  ## ruff, mypy and the import rules
 	$(BIN)/ruff check .

@@ -21,7 +21,9 @@ def describe(name: str) -> dict[str, Any]:
         model = load_model(name)
     except ValueError as error:
         raise UserError(str(error)) from None
-    fields = ("name", "unit", "nominal", "low", "high", "meaning", "source")
+    fields = ["name", "unit", "nominal", "low", "high", "meaning", "source"]
+    if any(item.ignored for item in model.inputs):
+        fields.append("ignored")
     return {
         "name": name,
         "version": model.version,

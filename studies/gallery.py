@@ -18,6 +18,7 @@ def main() -> None:
     drivers = run_study("configs/paper_sobol.toml", quiet=False)
     injuries = run_study("configs/paper_injury.toml", quiet=False)
     population = run_study("configs/population_injury.toml", quiet=False)
+    methods = run_study("configs/model_comparison.toml", quiet=False)
     hood = ResultsFolder("results/stiffness_hood_tests")
     fit_stiffness_of(Path("configs/hood_tests"), hood)
     validation = ResultsFolder("results/validation_throw")
@@ -33,6 +34,7 @@ def main() -> None:
         for name in names:
             shutil.copyfile(folder.path / "figures" / name, GALLERY / name)
     shutil.copyfile(population.path / "figures" / "ais.png", GALLERY / "population_ais.png")
+    shutil.copyfile(methods.path / "figures" / "variance.png", GALLERY / "method_variance.png")
     shutil.copyfile(validation.path / "figures" / "throw_1.png", GALLERY / "validation_throw.png")
 
 

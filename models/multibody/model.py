@@ -12,7 +12,7 @@ from models.crash.record import R_ZONES, S_FRAMES, S_GROUND_TIME, S_RECORDS, SUM
 from models.crash.surfaces import CHANNELS, empty_contacts
 from models.declaration import read_inputs, read_outputs
 from models.effects.registry import effects_of
-from models.multibody.setup import build_crash
+from models.multibody.setup import Crash, build_crash
 from models.multibody.simulation import (
     STABLE,
     Settings,
@@ -57,8 +57,15 @@ class MultibodyModel(CrashModel):
 
     def _step(self, values: dict[str, float]) -> outcome.Raw | None:
         crash = build_crash(values, self.vehicle, self._chain)
-        if crash is None:
-            return None
+        return None if crash is None else self.follow(crash, values)
+
+    def follow(self, crash: Crash, values: dict[str, float]) -> outcome.Raw:
+        """Return what the step loop leaves behind of an assembled crash, whose state it changes.
+
+        Parameters
+        ----------
+        crash : as ``build_crash`` gives it. values : of all inputs, from which it was built.
+        """
         n, zones = len(SEGMENTS), len(self.vehicle.zones)
         scenario = crash.scenario
         rate = damping_rate(crash.tree, scenario.joints)

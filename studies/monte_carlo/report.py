@@ -139,7 +139,8 @@ def _input_table(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> Ta
         else:
             value = float(runs[item.name].iloc[0])
             shown = ["fixed", "", number(value), "", unit(item.unit)]
-        rows.append([item.name, *shown, item.meaning])
+        meaning = f"{item.meaning}; ignored: {item.ignored}" if item.ignored else item.meaning
+        rows.append([item.name, *shown, meaning])
     head = ["input", "distribution", "5 %", "median or value", "95 %", "unit", "meaning"]
     return Table("Inputs as sampled, in the study file's units.", head, rows)
 

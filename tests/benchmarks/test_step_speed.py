@@ -125,7 +125,7 @@ def test_whole_crash(benchmark: Any) -> None:
         return (build_crash(values, model.vehicle), values), {}
 
     def crash(setup: Any, inputs: dict[str, float]) -> None:
-        steps.append(model._step(setup, inputs).summary[S_STEPS])
+        steps.append(model.follow(setup, inputs).summary[S_STEPS])
 
     # The step loop changes the state that it is given, so every round starts from a new one.
     benchmark.pedantic(crash, setup=assembled, rounds=20, warmup_rounds=1)

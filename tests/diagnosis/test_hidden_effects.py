@@ -79,8 +79,14 @@ def trial(tmp: Path, hidden: list[Hidden], seed: int, monkeypatch: pytest.Monkey
     "hidden",
     [
         Hidden("sensor_gain", "catalogue", {"factor": 1.06}),
-        Hidden("rate_dependent_hood", "dashpot", {"damping": 40.0}),
-        Hidden("sensor_saturation", "catalogue", {"limit": 110.0}),
+        pytest.param(
+            Hidden("rate_dependent_hood", "dashpot", {"damping": 40.0}),
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            Hidden("sensor_saturation", "catalogue", {"limit": 110.0}),
+            marks=pytest.mark.slow,
+        ),
         Hidden("hood_bottoming", "catalogue", {"clearance": 0.03, "stiffness": 2e5}),
     ],
     ids=lambda h: h.name,
@@ -96,7 +102,10 @@ def test_an_effect_of_the_catalogue_is_named(
 
 @pytest.mark.parametrize(
     "hidden",
-    [Hidden("ageing", "", {"loss": 0.01}), Hidden("cable", "", {"size": 0.8})],
+    [
+        Hidden("ageing", "", {"loss": 0.01}),
+        pytest.param(Hidden("cable", "", {"size": 0.8}), marks=pytest.mark.slow),
+    ],
     ids=lambda h: h.name,
 )
 def test_an_effect_outside_the_catalogue_is_not_named(

@@ -15,7 +15,7 @@ from mcstudy.config import load_study, parse_study
 from mcstudy.errors import StudyError, UserError
 from mcstudy.results import ResultsFolder, digest
 from models.registry import load_model
-from studies import api
+from studies import api, catalogue
 from studies.model_comparison.study import NOMINAL, build_report
 
 FACTOR = 2.0**0.75
@@ -201,6 +201,12 @@ def test_another_model_does_not_mix_with_what_is_there(
 ) -> None:
     with pytest.raises(UserError, match=r"models.soft: .*holds another study"):
         api.run_study(write(tmp_path, text_of(soft=9000.0)), out=hoods.path, workers=1)
+
+
+def test_the_list_of_inputs_says_what_is_ignored() -> None:
+    for name, marked in (("planar", 2), ("multibody", 0)):
+        rows = catalogue.describe(name)["inputs"]
+        assert sum(bool(row.get("ignored")) for row in rows) == marked
 
 
 def test_too_many_failures_name_the_model(tmp_path: Path) -> None:

@@ -8,15 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.crash import outcome
-from models.crash.record import END_REASONS, S_REASON
+from models.crash.record import END_REASONS, R_ZONES, S_REASON
 from models.declaration import run_rows
 from models.effects.chain import build_chain
-from models.pedestrian.anthropometry import is_possible
+from models.pedestrian.anthropometry import SEGMENTS, is_possible
 from models.protocol import OK, Batch, Input, Output, Run, complete_inputs
 from models.vehicle.profile import Vehicle, load_vehicle
 
 Array = NDArray[np.float64]
 
+TICK = 1e-4
+"""Default finest step (s): HIC15 is within 0.7 % of its value at a quarter of it."""
 TIME_LIMIT = 12.0
 """s of crash after which a run counts as failed."""
 FRAME_INTERVAL = 2e-3
@@ -57,15 +59,18 @@ class CrashModel(ABC):
 
     def __init__(
         self,
-        vehicle: str,
-        tick: float,
-        effects: Mapping[str, Mapping[str, float]] | None,
+        vehicle: str = "family_car_1990s",
+        tick: float = TICK,
+        effects: Mapping[str, Mapping[str, float]] | None = None,
     ) -> None:
         if not 1e-6 <= float(tick) <= 2e-4:
             raise ValueError(f"tick must lie within 1e-6 and 2e-4 s, given {tick}")
         self.vehicle: Vehicle = load_vehicle(vehicle)
         self.tick = float(tick)
         self._chain = build_chain(self.name, effects)
+        n, zones = len(SEGMENTS), len(self.vehicle.zones)
+        self._record = np.zeros((int(TIME_LIMIT / self.tick) + 2, R_ZONES + zones + 1))
+        self._frames = np.zeros((int(TIME_LIMIT / FRAME_INTERVAL) + 2, 4 + 7 * n))
 
     @property
     def inputs(self) -> tuple[Input, ...]:

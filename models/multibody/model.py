@@ -1,14 +1,13 @@
 """The multibody crash model behind the model protocol."""
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
 from models import data
 from models.crash import outcome
 from models.crash.model import FRAME_INTERVAL, TIME_LIMIT, CrashModel
-from models.crash.record import R_ZONES, S_FRAMES, S_GROUND_TIME, S_RECORDS, SUMMARY
+from models.crash.record import S_FRAMES, S_GROUND_TIME, S_RECORDS, SUMMARY
 from models.crash.surfaces import CHANNELS, empty_contacts
 from models.declaration import read_inputs, read_outputs
 from models.effects.registry import effects_of
@@ -24,8 +23,6 @@ from models.multibody.simulation import (
 from models.multibody.tree import empty_loads
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
 
-TICK = 1e-4
-"""Default finest step (s): HIC15 is within 0.2 % of its value at a quarter of it."""
 COARSE, FLIGHT = 3, 6
 """Ticks a step in quiet contact and in free flight."""
 
@@ -43,17 +40,6 @@ class MultibodyModel(CrashModel):
     outputs = read_outputs(_TABLE)
     effects: tuple[str, ...] = effects_of("multibody")
     _own_inputs = read_inputs(_TABLE)
-
-    def __init__(
-        self,
-        vehicle: str = "family_car_1990s",
-        tick: float = TICK,
-        effects: Mapping[str, Mapping[str, float]] | None = None,
-    ) -> None:
-        super().__init__(vehicle, tick, effects)
-        n, zones = len(SEGMENTS), len(self.vehicle.zones)
-        self._record = np.empty((int(TIME_LIMIT / self.tick) + 2, R_ZONES + zones + 1))
-        self._frames = np.empty((int(TIME_LIMIT / FRAME_INTERVAL) + 2, 4 + 7 * n))
 
     def _step(self, values: dict[str, float]) -> outcome.Raw | None:
         crash = build_crash(values, self.vehicle, self._chain)

@@ -1,6 +1,5 @@
 """The planar crash model behind the model protocol."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +8,7 @@ from models import data
 from models.crash import outcome
 from models.crash.first_contact import first_contact_shift, widen_gaps
 from models.crash.model import FRAME_INTERVAL, TIME_LIMIT, CrashModel
-from models.crash.record import R_ZONES, S_FRAMES, S_GROUND_TIME, S_HEAD_ZONE, S_RECORDS, SUMMARY
+from models.crash.record import S_FRAMES, S_GROUND_TIME, S_HEAD_ZONE, S_RECORDS, SUMMARY
 from models.crash.scenario import build_scenario
 from models.crash.surfaces import CHANNELS, Contacts, empty_contacts
 from models.declaration import read_inputs, read_outputs
@@ -29,8 +28,6 @@ from models.planar.stepping import (
     simulate,
 )
 
-TICK = 1e-4
-"""Default finest step (s)."""
 COARSE, FLIGHT, ROAD = 3, 6, 20
 """Ticks a step in contact with the car, above it, and clear of it."""
 
@@ -53,17 +50,6 @@ class PlanarModel(CrashModel):
         replace(item, ignored=_TABLE["ignored"].get(item.name, ""))
         for item in read_inputs(_SPATIAL)
     )
-
-    def __init__(
-        self,
-        vehicle: str = "family_car_1990s",
-        tick: float = TICK,
-        effects: Mapping[str, Mapping[str, float]] | None = None,
-    ) -> None:
-        super().__init__(vehicle, tick, effects)
-        n, zones = len(SEGMENTS), len(self.vehicle.zones)
-        self._record = np.zeros((int(TIME_LIMIT / self.tick) + 2, R_ZONES + zones + 1))
-        self._frames = np.empty((int(TIME_LIMIT / FRAME_INTERVAL) + 2, 4 + 7 * n))
 
     def _step(self, values: dict[str, float]) -> outcome.Raw | None:
         scenario = build_scenario(values, self.vehicle, self._chain)

@@ -8,7 +8,7 @@ from scipy.stats import qmc
 from mcstudy.figures import style
 from mcstudy.figures.panels import Curve, Panel, draw_panels
 from mcstudy.text import number
-from models.multibody.model import TICK
+from models.crash.model import TICK
 from models.protocol import complete_status
 from models.registry import load_model
 from studies.validation.check import Part, check

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from models.multibody.model import TICK, MultibodyModel
+from models.crash.model import TICK
+from models.multibody.model import MultibodyModel
 from models.protocol import Run
 from models.registry import load_model, model_names
 

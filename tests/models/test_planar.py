@@ -8,8 +8,9 @@ import joblib
 import numpy as np
 import pytest
 
+from models.crash.model import TICK
 from models.effects.registry import effects_of, load_effect
-from models.planar.model import TICK, PlanarModel
+from models.planar.model import PlanarModel
 from models.protocol import Run
 from models.registry import load_model, model_names
 from models.rotation import matrix_of

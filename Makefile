@@ -51,7 +51,7 @@ calibrate: install  ## calibrate to the case's tables again and print the values
 
 lock: install  ## lock the newest versions that pyproject.toml allows
 	$(BIN)/python -m pip install --quiet uv
-	$(BIN)/uv pip compile --universal --python-version 3.11 --extra dev --no-annotate --no-header --quiet --upgrade pyproject.toml --output-file requirements.lock
+	$(BIN)/uv pip compile --universal --python-version 3.11 --extra dev --extra cluster --no-annotate --no-header --quiet --upgrade pyproject.toml --output-file requirements.lock
 
 clean:  ## remove .venv, caches and results (not the gallery)
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info build

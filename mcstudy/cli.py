@@ -3,6 +3,7 @@
 Exit codes: 0 done, 1 the study failed, 2 the user's input is wrong, 130 interrupted.
 """
 
+import os
 import re
 import sys
 from collections.abc import Iterable
@@ -39,6 +40,10 @@ def _check_workers(value: int) -> int:
 Workers = Annotated[
     int, typer.Option(help="Worker processes; -1 for one a core.", callback=_check_workers)
 ]
+Cluster = Annotated[
+    str | None,
+    typer.Option(help="Address of a dask scheduler (tcp://...), or local, in place of --workers."),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print no progress and no summary.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
@@ -48,13 +53,15 @@ def run(
     study: Study,
     out: Out = None,
     workers: Workers = -1,
+    cluster: Cluster = None,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
     """Run a study, or go on with it where it stopped, and write its report."""
     from studies import api
 
-    folder = api.run_study(study, out=out, workers=workers, quiet=quiet or as_json)
+    where = workers if cluster is None else cluster
+    folder = api.run_study(study, out=out, workers=where, quiet=quiet or as_json)
     analysis = folder.read_json("analysis.json")
     summary = api.summarise(folder, analysis)
     _print_analysis(analysis, summary, folder.path, quiet=quiet, as_json=as_json)
@@ -251,14 +258,16 @@ def status(folder: Folder, as_json: Json = False) -> None:
     from mcstudy.results import ResultsFolder
 
     results = ResultsFolder(folder)
-    manifest = results.read_json("manifest.json")
-    total = int(manifest["design"]["n"])
+    manifest, total = results.read_json("manifest.json"), results.design()["n"]
     done, counts = results.progress()
     if as_json:
         _print_json({"done": done, "total": total, "counts": counts})
         return
     detail = ", ".join(f"{n} {name}" for name, n in counts.items())
-    print(f"{manifest['study']}: {done} of {total} runs done" + (f" ({detail})" if detail else ""))
+    print(
+        f"{manifest.get('study', folder.name)}: {done} of {total} runs done"
+        + (f" ({detail})" if detail else "")
+    )
 
 
 @app.command()
@@ -373,13 +382,20 @@ def main() -> None:
             _fail(error.format_message(), 2)
         raise
     if code == 130:
-        _fail("interrupted; what arrived is kept, run the same command again to resume", 130)
+        _print_failure("interrupted; what arrived is kept, run the same command again to resume")
+        sys.stdout.flush()
+        # Whoever interrupts does not want to wait for libraries to say goodbye.
+        os._exit(130)
     sys.exit(code if isinstance(code, int) else 0)
 
 
 def _fail(message: str, code: int) -> NoReturn:
-    print(f"mcstudy: {message}", file=sys.stderr)
+    _print_failure(message)
     sys.exit(code)
+
+
+def _print_failure(message: str) -> None:
+    print(f"mcstudy: {message}", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

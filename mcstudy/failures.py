@@ -1,12 +1,17 @@
 """Failed runs: how many, and where in the space of inputs."""
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from mcstudy.chunk import CRASHED, NOT_FINITE, TIMEOUT, UNPHYSICAL
+
 Flags = NDArray[np.bool_]
+
+_ENDINGS = {TIMEOUT: "timeout", CRASHED: "crashed", NOT_FINITE: "invalid", UNPHYSICAL: "invalid"}
 
 PARTS = 10
 """Parts of equal counts into which an input's range is cut."""
@@ -67,3 +72,32 @@ def locate_failures(inputs: pd.DataFrame, failed: Flags, block: int = 1) -> dict
         if place:
             entry["where"][name] = {"mean_rank": float(means[k]), "place": place}
     return entry
+
+
+def endings(runs: pd.DataFrame, complete: Collection[str]) -> list[dict[str, Any]]:
+    """Return how runs ended, the most frequent first.
+
+    Parameters
+    ----------
+    runs : table with ``status`` and ``reason``. complete : statuses that are no failure.
+
+    Returns
+    -------
+    list of dict
+        ``status``, ``ending`` (ok, failed, invalid, timeout or crashed), ``runs`` and the most
+        frequent ``reason``, empty where the status says it all.
+    """
+    found = []
+    told = runs["reason"] if "reason" in runs.columns else pd.Series("", index=runs.index)
+    for status, count in runs["status"].value_counts().items():
+        word = str(status)
+        reasons = told[(runs["status"] == status) & (told != "")]
+        found.append(
+            {
+                "status": word,
+                "ending": "ok" if word in complete else _ENDINGS.get(word, "failed"),
+                "runs": int(count),
+                "reason": str(reasons.mode().iloc[0]) if len(reasons) else "",
+            }
+        )
+    return found

@@ -1,12 +1,22 @@
 """A live line for long work: done, failed, rate, time left. Silent where nobody looks."""
 
+import math
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TextIO, TypeVar
 
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
 Item = TypeVar("Item")
+
+REACH = 1.96
+"""Standard errors of a 95 % interval."""
+FEWEST = 10
+"""Values below which nothing is said of a mean."""
 
 
 def say(text: str, *, quiet: bool = False, stream: TextIO = sys.stderr) -> None:
@@ -39,6 +49,33 @@ def follow(
         stream.flush()
 
 
+class _RunningMean:
+    """Mean and variance of values that come in parts (T. Chan and others, 1979)."""
+
+    def __init__(self) -> None:
+        self.count, self.mean, self.square = 0, 0.0, 0.0
+
+    def add(self, values: NDArray[np.float64]) -> None:
+        """Take the finite ones of more values."""
+        part = values[np.isfinite(values)]
+        if not part.size:
+            return
+        total = self.count + part.size
+        shift = float(part.mean()) - self.mean
+        self.square += float(((part - part.mean()) ** 2).sum())
+        self.square += shift**2 * self.count * part.size / total
+        self.mean += shift * part.size / total
+        self.count = total
+
+    @property
+    def relative_reach(self) -> float:
+        """Half the 95 % interval of the mean over the mean; NaN for fewer than ten values."""
+        if self.count < FEWEST or self.mean == 0.0:
+            return math.nan
+        error = math.sqrt(self.square / (self.count - 1) / self.count)
+        return abs(REACH * error / self.mean)
+
+
 class Progress:
     """Progress of one study on a terminal.
 
@@ -48,6 +85,7 @@ class Progress:
         Print nothing at all. Without a terminal nothing is printed either way.
     complete : frozenset of str
         Statuses that do not count as failed.
+    watched : outputs of whose means the widest interval is shown.
     stream : TextIO, by default standard error
     """
 
@@ -56,11 +94,14 @@ class Progress:
         *,
         quiet: bool = False,
         complete: frozenset[str] = frozenset({"ok"}),
+        watched: Sequence[str] = (),
         stream: TextIO | None = None,
     ) -> None:
         self._stream = stream or sys.stderr
         self._live = not quiet and self._stream.isatty()
         self._complete = complete
+        self._watched = tuple(watched)
+        self._means = {name: _RunningMean() for name in self._watched}
         self._counts: Counter[str] = Counter()
         self._total = self._done = self._first = 0
         self._start = time.perf_counter()
@@ -79,11 +120,26 @@ class Progress:
             self._stream.write(f"{total} runs{resumed}; the first compiles the model\n")
             self._stream.flush()
 
-    def advance(self, runs: int, counts: Mapping[str, int]) -> None:
-        """Count runs that arrived, by status."""
-        self._done += runs
-        self._counts.update(counts)
+    def advance(self, frame: pd.DataFrame) -> None:
+        """Count runs that arrived: a table with ``status`` and the outputs that are watched."""
+        self._done += len(frame)
+        self._counts.update(frame["status"].tolist())
+        for name in self._watched:
+            self._means[name].add(frame[name].to_numpy(dtype=float))
         self._show()
+
+    @property
+    def widest(self) -> tuple[str, float] | None:
+        """The output whose mean is known worst so far, and half its 95 % interval over the mean.
+
+        Of the runs of this session, as if they were independent; None if nothing can be said.
+        """
+        known = {name: mean.relative_reach for name, mean in self._means.items()}
+        finite = {name: reach for name, reach in known.items() if math.isfinite(reach)}
+        if not finite:
+            return None
+        name = max(finite, key=lambda key: finite[key])
+        return name, finite[name]
 
     def finish(self) -> None:
         """End the line."""
@@ -97,8 +153,10 @@ class Progress:
         elapsed = time.perf_counter() - self._start
         rate = (self._done - self._first) / elapsed if elapsed > 0.0 else 0.0
         left = (self._total - self._done) / rate if rate > 0.0 else 0.0
+        widest = self.widest
+        known = "" if widest is None else f", {widest[0]} ± {100.0 * widest[1]:.2g} %"
         self._stream.write(
-            f"\r{self._done}/{self._total} done, {self.failed} failed, "
-            f"{rate:.1f} runs/s, {left:.0f} s left   "
+            f"\r\x1b[K{self._done}/{self._total} done, {self.failed} failed, "
+            f"{rate:.1f} runs/s, {left:.0f} s left{known}"
         )
         self._stream.flush()

@@ -15,8 +15,9 @@
 import contextlib
 import hashlib
 import json
+import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,8 @@ from mcstudy.errors import StudyError, UserError
 from mcstudy.simulator import HistoryLike
 
 RUNS = "runs.parquet"
+_DIGEST = b"mcstudy.digest"
+_CELL = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,79}(/[A-Za-z0-9][A-Za-z0-9_.-]{0,79})?")
 
 
 class ResultsFolder:
@@ -42,6 +45,7 @@ class ResultsFolder:
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
+        self._writing = False
 
     # -- writing ---------------------------------------------------------------------------
 
@@ -68,7 +72,11 @@ class ResultsFolder:
                 raise UserError(
                     f"{self.path}: another run writes into this folder; wait or choose --out"
                 ) from None
-            yield
+            self._writing = True
+            try:
+                yield
+            finally:
+                self._writing = False
 
     def write_text(self, name: str, text: str) -> None:
         """Write a text file at once: a reader sees the old one or the new one."""
@@ -86,7 +94,13 @@ class ResultsFolder:
         target = self.path / name
         target.parent.mkdir(parents=True, exist_ok=True)
         with _replacing(target) as temporary:
-            pq.write_table(pa.Table.from_pandas(frame, preserve_index=False), temporary)
+            table = pa.Table.from_pandas(frame, preserve_index=False)
+            # The digest travels in the file: what is read is what was written, or is torn.
+            metadata = {
+                **(table.schema.metadata or {}),
+                _DIGEST: digest(table.to_pandas()).encode(),
+            }
+            pq.write_table(table.replace_schema_metadata(metadata), temporary)
 
     def add_part(self, frame: pd.DataFrame) -> None:
         """Keep a chunk of runs."""
@@ -118,13 +132,14 @@ class ResultsFolder:
         frames = []
         for file in files + self._parts():
             try:
-                frames.append(pq.read_table(file).to_pandas())
+                frames.append(read_runs(file))
             except FileNotFoundError:
                 # A run compacted its parts meanwhile: what they held is in the table now.
                 return self.done()
-            except pa.ArrowInvalid:
-                # A torn file is run again.
-                file.rename(file.with_suffix(".broken"))
+            except ValueError:
+                # A torn file is set aside, and what it held is run again.
+                if self._writing:
+                    file.rename(file.with_suffix(".broken"))
         if not frames:
             return None
         runs = pd.concat(frames, ignore_index=True).drop_duplicates("run")
@@ -133,29 +148,63 @@ class ResultsFolder:
 
     def progress(self) -> tuple[int, dict[str, int]]:
         """Return how many runs of the design are done, in the folder or its cells, by status."""
-        design = self.read_json("manifest.json")["design"]
+        design = self.design()
         counts: Counter[str] = Counter()
-        for cell in design.get("cells", ()):
+        for cell in design["cells"]:
             inner = ResultsFolder(self.path / "cells" / cell)
             if (inner.path / "manifest.json").exists():
                 counts.update(inner.progress()[1])
         runs = self.done()
         if runs is not None:
             # A folder may hold runs of an earlier, larger design.
-            counts.update(runs["status"][runs["run"] < int(design["n"])].tolist())
+            counts.update(runs["status"][runs["run"] < design["n"]].astype(str).tolist())
         return counts.total(), dict(counts.most_common())
 
-    def runs(self) -> pd.DataFrame:
-        """Return the table of runs.
+    def design(self) -> dict[str, Any]:
+        """Return what the manifest says of the design: ``n``, ``block`` and ``cells`` at least.
 
         Raises
         ------
         UserError
-            If the folder holds no runs.
+            If it does not say it, or not so that it can be believed.
+        """
+        place = self.path / "manifest.json"
+        design = self.read_json("manifest.json").get("design")
+        if not isinstance(design, dict):
+            raise UserError(f"{place}: has no table 'design'")
+        found: dict[str, Any] = {"block": 1, "cells": []} | design
+        for key in ("n", "block"):
+            value = found.get(key)
+            if not isinstance(value, int) or isinstance(value, bool) or not 0 < value < 2**53:
+                raise UserError(f"{place}: design.{key} must be a whole number above 0")
+        cells = found["cells"]
+        plain = isinstance(cells, list) and all(isinstance(cell, str) for cell in cells)
+        if not plain or any(not _CELL.fullmatch(cell) for cell in cells):
+            raise UserError(f"{place}: design.cells must be names of folders")
+        return found
+
+    def runs(self, numbers: Sequence[str] = ()) -> pd.DataFrame:
+        """Return the table of runs.
+
+        Parameters
+        ----------
+        numbers : columns of numbers that it must have.
+
+        Raises
+        ------
+        UserError
+            If the folder holds no runs, or a column is missing or holds something else.
         """
         found = self.done()
-        if found is None:
+        if found is None or found.empty:
             raise UserError(f"{self.path}: holds no runs; run the study first")
+        for name in numbers:
+            if name not in found.columns:
+                raise UserError(
+                    f"{self.path}: its runs have no column {name!r}; run the study again"
+                )
+            if found[name].dtype.kind not in ("iu" if name == "replicate" else "fiu"):
+                raise UserError(f"{self.path}: column {name!r} of its runs holds no numbers")
         return found
 
     def read_json(self, name: str) -> dict[str, Any]:
@@ -227,9 +276,32 @@ def to_json(content: Any) -> str:
     return json.dumps(_plain(content), indent=2, allow_nan=False) + "\n"
 
 
+def read_runs(file: Path) -> pd.DataFrame:
+    """Return a table of runs.
+
+    Raises
+    ------
+    ValueError
+        If the file is torn, corrupted or no table of runs.
+    """
+    try:
+        table = pq.read_table(file)
+        frame: pd.DataFrame = table.to_pandas()
+    except FileNotFoundError:
+        raise
+    except (pa.ArrowException, OSError, ValueError, TypeError, KeyError) as error:
+        raise ValueError(f"{file}: {error}") from None
+    held = (table.schema.metadata or {}).get(_DIGEST)
+    if not {"run", "status"} <= set(frame.columns) or frame["run"].dtype.kind not in "iu":
+        raise ValueError(f"{file}: is no table of runs")
+    if held is not None and held != digest(frame).encode():
+        raise ValueError(f"{file}: its numbers are not those that were written")
+    return frame
+
+
 def digest(frame: pd.DataFrame) -> str:
-    """Return a digest of the numbers of a table of runs, independent of how they were run."""
-    ordered = frame.sort_values("run")
+    """Return a digest of the numbers of a table, independent of how its runs were run."""
+    ordered = frame.sort_values("run") if "run" in frame.columns else frame
     total = hashlib.sha256()
     for name in ordered.columns:
         column = ordered[name]

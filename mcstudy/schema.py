@@ -21,6 +21,8 @@ from mcstudy.sensitivity.factors import DUMMY
 LARGEST_DESIGN = 10_000_000
 """Runs that one study may have; their table fits a machine's memory."""
 LARGEST_SEED = 2**63 - 1
+RUN_TIME = 600.0
+"""s that one run may take by default before its process is ended."""
 Options = dict[str, str | FiniteFloat | list[list[FiniteFloat]]]
 """Options of a model."""
 
@@ -127,14 +129,20 @@ class CommonStudy(AnyStudy):
     effects: dict[str, dict[str, FiniteFloat]] = {}
 
 
-class MonteCarloStudy(CommonStudy):
+class Limits(StudyTable):
+    """How much may go wrong: the share of runs that may fail, and s that one run may take."""
+
+    max_failure_rate: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
+    run_time: Annotated[FiniteFloat, Field(ge=0.01, le=1e6)] = RUN_TIME
+
+
+class MonteCarloStudy(CommonStudy, Limits):
     """``kind = "monte-carlo"``: sample inputs, run, describe the outputs."""
 
     kind: Literal["monte-carlo"]
     design: Design = Design()
     inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
     dependence: Dependence = Dependence()
-    max_failure_rate: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
     report: Report = Report()
 
 
@@ -166,14 +174,13 @@ class Reconstruction(CommonStudy):
     strip_times: Annotated[list[FiniteFloat], Field(min_length=1)] = STRIP_TIMES
 
 
-class FactorStudy(CommonStudy):
+class FactorStudy(CommonStudy, Limits):
     """What kinds of study have that exchange one factor, an input or a group, after the other."""
 
     kind: str
     inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
     dependence: Dependence = Dependence()
     groups: dict[str, Annotated[list[str], Field(min_length=1)]] = {}
-    max_failure_rate: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
 
     @model_validator(mode="after")
     def _grouped_once(self) -> "FactorStudy":
@@ -291,14 +298,13 @@ HEAD = "head"
 """All mechanisms of injury together."""
 
 
-class InjuryStudy(CommonStudy):
+class InjuryStudy(CommonStudy, Limits):
     """``kind = "injury"``: from runs to AIS outcomes, for scenarios and car fronts."""
 
     kind: Literal["injury"]
     design: Design = Design()
     inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
     dependence: Dependence = Dependence()
-    max_failure_rate: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
     age: Annotated[FiniteFloat, Field(gt=0.0, lt=130.0)] | None = None
     mechanisms: Annotated[dict[str, MechanismChoice], Field(min_length=1)]
     together: Literal["dependent", "independent"] = "dependent"
@@ -352,7 +358,7 @@ class ComparisonReport(StudyTable):
     strip_times: Annotated[list[FiniteFloat], Field(min_length=1)] = STRIP_TIMES
 
 
-class ModelComparison(AnyStudy):
+class ModelComparison(AnyStudy, Limits):
     """``kind = "model-comparison"``: the same inputs through two or more models."""
 
     kind: Literal["model-comparison"]
@@ -360,7 +366,6 @@ class ModelComparison(AnyStudy):
     design: Design = Design()
     inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
     dependence: Dependence = Dependence()
-    max_failure_rate: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
     report: ComparisonReport = ComparisonReport()
     tables: list[ComparisonTable] = []
 

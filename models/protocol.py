@@ -4,6 +4,7 @@ A model never raises for a row of inputs inside its ranges: a run that fails is 
 other than ``ok`` and NaN where an output has no value. A row of a batch depends on that row alone.
 """
 
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -44,11 +45,20 @@ class Input:
 
 @dataclass(frozen=True)
 class Output:
-    """An output of a model: name, unit, meaning."""
+    """An output of a model.
+
+    Attributes
+    ----------
+    name, unit, meaning : str
+    low, high : float
+        Values beyond which a run is not physical, whatever its inputs.
+    """
 
     name: str
     unit: str
     meaning: str
+    low: float = -math.inf
+    high: float = math.inf
 
 
 @dataclass(frozen=True)

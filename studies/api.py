@@ -13,12 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mcstudy.cluster import Workers
 from mcstudy.config import ModelComparison, Reconstruction, Study, load_study
 from mcstudy.errors import UserError
 from mcstudy.report import Table
 from mcstudy.results import ResultsFolder
 from models.protocol import Run
-from studies.execution import load_study_model
+from studies.execution import columns_of, load_study_model
 from studies.injury import report as injury_report
 from studies.injury import study as injury
 from studies.model_comparison import report as model_comparison_report
@@ -73,7 +74,7 @@ def run_study(
     path: Path | str,
     *,
     out: Path | str | None = None,
-    workers: int = -1,
+    workers: Workers = -1,
     quiet: bool = True,
 ) -> ResultsFolder:
     """Run a study file of any sampled kind, or go on with it where it stopped.
@@ -82,7 +83,7 @@ def run_study(
     ----------
     path : study file.
     out : results folder, by default ``results/<name>``.
-    workers : processes, -1 for one a core.
+    workers : processes, -1 for one a core, or the address of a dask scheduler.
     quiet : print no progress line.
 
     Returns
@@ -169,7 +170,7 @@ def rerun(results: ResultsFolder, run: int) -> Run:
     if isinstance(study, ModelComparison):
         raise UserError(f"{results.path}: give the folder of one of its models, under cells")
     model = load_study_model(study)
-    runs = results.runs()
+    runs = results.runs(columns_of(model))
     row = runs[runs["run"] == run]
     if row.empty:
         raise UserError(f"{results.path}: has no run {run}, only 0 to {runs['run'].max()}")

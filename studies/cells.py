@@ -8,12 +8,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from mcstudy.cluster import Workers
 from mcstudy.config import InjuryStudy, ModelComparison, MonteCarloStudy
 from mcstudy.errors import StudyError, UserError
 from mcstudy.progress import say
 from mcstudy.results import ResultsFolder, digest
 from models.protocol import Model
-from studies.execution import run_rows
+from studies.execution import columns_of, run_rows
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ def run_cells(
     folder: ResultsFolder,
     cells: Sequence[PreparedCell],
     *,
-    workers: int,
+    workers: Workers,
     quiet: bool,
 ) -> None:
     """Run what is missing of all cells and write the study's manifest.
@@ -51,7 +52,8 @@ def run_cells(
     ----------
     study, text : the study and its file as written. folder : open for writing.
     cells : in the order in which they are run.
-    workers : processes, -1 for one a core. quiet : no progress line.
+    workers : processes, -1 for one a core, or the address of a dask scheduler.
+    quiet : no progress line.
 
     Raises
     ------
@@ -96,8 +98,8 @@ def run_cells(
     folder.write_json("manifest.json", manifest)
 
 
-def cell_runs(folder: ResultsFolder, name: str, n: int) -> pd.DataFrame:
-    """Return the first n runs of a cell.
+def cell_runs(folder: ResultsFolder, name: str, n: int, model: Model) -> pd.DataFrame:
+    """Return the first n runs of a cell of a model.
 
     Raises
     ------
@@ -105,7 +107,7 @@ def cell_runs(folder: ResultsFolder, name: str, n: int) -> pd.DataFrame:
         If not all of them are done.
     """
     inner = cell_folder(folder, name)
-    runs = inner.runs()
+    runs = inner.runs(columns_of(model))
     runs = runs[runs["run"] < n]
     if len(runs) < n:
         raise UserError(

@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from typing import Any
 
-import joblib
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from mcstudy import config, runner
+from mcstudy.cluster import Workers, at_work
 from mcstudy.config import (
     CommonStudy,
     FactorStudy,
@@ -21,7 +21,7 @@ from mcstudy.config import (
     SampledStudy,
 )
 from mcstudy.errors import UserError
-from mcstudy.failures import locate_failures
+from mcstudy.failures import endings, locate_failures
 from mcstudy.figures import style
 from mcstudy.progress import Progress
 from mcstudy.report import Section, render
@@ -56,7 +56,7 @@ def run_rows(
     *,
     design: Mapping[str, Any],
     replicate: NDArray[np.int64],
-    workers: int,
+    workers: Workers,
     quiet: bool,
 ) -> pd.DataFrame:
     """Run what is missing of a design, keep it, write the manifest and return all its runs.
@@ -66,7 +66,8 @@ def run_rows(
     study, model : of the folder, which is open for writing.
     columns : (n,) values of every input of the model.
     design : what the manifest says of the design. replicate : (n,) of each row.
-    workers : processes, -1 for one a core. quiet : no progress line.
+    workers : processes, -1 for one a core, or the address of a dask scheduler.
+    quiet : no progress line.
 
     Raises
     ------
@@ -86,6 +87,8 @@ def run_rows(
         input_names=[item.name for item in model.inputs],
         output_names=[item.name for item in model.outputs],
         replicate=replicate,
+        bounds=np.array([[item.low, item.high] for item in model.outputs]),
+        run_time=study.run_time,
     )
     complete = complete_status(model)
     manifest = _manifest(study, model, config.numbers_digest(study, model), design, workers)
@@ -93,8 +96,9 @@ def run_rows(
     manifest["wall_time_s"] = spent.get("wall_time_s", 0.0)
     folder.write_json("manifest.json", manifest)
     start = time.perf_counter()
-    with joblib.parallel_config(backend="loky", n_jobs=workers):
-        runs = runner.run(task, folder, Progress(quiet=quiet, complete=complete))
+    with at_work(workers):
+        progress = Progress(quiet=quiet, complete=complete, watched=watched_outputs(study, model))
+        runs = runner.run(task, folder, progress)
     # A study that was larger before keeps its further runs.
     folder.compact(held if (held := folder.done()) is not None else runs)
     counts = status_counts(runs)
@@ -109,28 +113,40 @@ def run_rows(
     return runs
 
 
-def whole_prefix(folder: ResultsFolder, design: Mapping[str, Any]) -> pd.DataFrame:
+def watched_outputs(study: SampledStudy, model: Model) -> list[str]:
+    """Return the outputs whose intervals the live line shows: those that the report draws."""
+    return config.report_outputs(study, model)
+
+
+def columns_of(model: Model) -> list[str]:
+    """Return the columns of numbers that the runs of a model have."""
+    names = [item.name for item in model.inputs] + [item.name for item in model.outputs]
+    return ["replicate", *names]
+
+
+def whole_prefix(folder: ResultsFolder, model: Model) -> pd.DataFrame:
     """Return the first runs of a design in blocks, up to the first block with a missing run.
 
     Parameters
     ----------
-    folder : ResultsFolder
-    design : of its manifest, with ``n`` runs in blocks of ``block``.
+    folder : whose manifest tells of ``n`` runs in blocks of ``block``. model : of the runs.
 
     Raises
     ------
     UserError
         If not even the first blocks are there.
     """
-    runs = folder.runs()
-    runs = runs[runs["run"] < int(design["n"])]
-    block = int(design["block"])
+    design = folder.design()
+    runs = folder.runs(columns_of(model))
+    runs = runs[runs["run"] < design["n"]]
+    block: int = design["block"]
     ids = runs["run"].to_numpy()
     gaps = np.flatnonzero(ids != np.arange(ids.size))
     blocks = (int(gaps[0]) if gaps.size else ids.size) // block
     if blocks < FEWEST_BLOCKS:
         raise UserError(f"{folder.path}: too few runs are done for a report; run the study again")
-    return runs.iloc[: blocks * block]
+    held: pd.DataFrame = runs.iloc[: blocks * block]
+    return held
 
 
 def describe_runs(
@@ -150,6 +166,7 @@ def describe_runs(
         "kind": study.kind,
         "runs": len(runs),
         "status": status_counts(runs),
+        "endings": endings(runs, complete_status(model)),
         "failures": locate_failures(runs[list(study.inputs)], ~complete, block),
     }
     return ended, complete
@@ -200,7 +217,7 @@ def _manifest(
     model: Model,
     topics: Mapping[str, str],
     design: Mapping[str, Any],
-    workers: int,
+    workers: Workers,
 ) -> dict[str, Any]:
     return {
         "format": "mcstudy-results/1",

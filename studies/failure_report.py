@@ -42,5 +42,8 @@ def failures_said(analysis: Mapping[str, Any]) -> list[str]:
 
 def status_table(analysis: Mapping[str, Any]) -> Table:
     """Return how the runs ended."""
-    rows = [[status, f"{count:,}"] for status, count in analysis["status"].items()]
-    return Table("How the runs ended.", ["status", "runs"], rows)
+    rows = [
+        [row["ending"], row["status"].replace("_", " "), f"{row['runs']:,}", row["reason"]]
+        for row in analysis["endings"]
+    ]
+    return Table("How the runs ended.", ["end", "status", "runs", "most frequent reason"], rows)

@@ -36,7 +36,8 @@ def cells_of(study: InjuryStudy) -> Iterator[Cell]:
                     seed=study.seed, model=model, fixed=study.fixed, effects=study.effects,
                     design=study.design,
                     inputs=study.inputs | changes.inputs, dependence=study.dependence,
-                    max_failure_rate=study.max_failure_rate, report=Report(histories=0),
+                    max_failure_rate=study.max_failure_rate, run_time=study.run_time,
+                    report=Report(histories=0),
                 ),
                 changes,
             )  # fmt: skip

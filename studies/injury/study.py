@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from mcstudy import config
+from mcstudy.cluster import Workers
 from mcstudy.config import InjuryStudy, load_study
 from mcstudy.errors import UserError
 from mcstudy.injury.functions import RiskFunction, risk_function
@@ -28,7 +29,7 @@ def run_injury(
     text: str,
     folder: ResultsFolder,
     *,
-    workers: int = -1,
+    workers: Workers = -1,
     quiet: bool = False,
 ) -> dict[str, Any]:
     """Run all cells of a study, or go on with them, and write its results folder.
@@ -37,7 +38,8 @@ def run_injury(
     ----------
     study : InjuryStudy
     text : the study file as written. folder : ResultsFolder
-    workers : processes, -1 for one a core. quiet : no progress line.
+    workers : processes, -1 for one a core, or the address of a dask scheduler.
+    quiet : no progress line.
 
     Returns
     -------
@@ -74,7 +76,7 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
     functions = check_functions(study, model)
     frames = []
     for cell in cells_of(study):
-        runs = cell_runs(folder, cell.name, study.design.n)
+        runs = cell_runs(folder, cell.name, study.design.n, model)
         frames.append(runs.assign(scenario=cell.scenario, front=cell.front))
     runs = pd.concat(frames, ignore_index=True)
     ended, complete = judge_runs(study, model, runs)

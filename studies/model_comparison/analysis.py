@@ -13,7 +13,7 @@ from mcstudy import config, units
 from mcstudy.agreement import breaking_inputs, compare, split_variance
 from mcstudy.config import ModelComparison
 from mcstudy.errors import StudyError, UserError
-from mcstudy.failures import locate_failures
+from mcstudy.failures import endings, locate_failures
 from mcstudy.results import check_failures, status_counts
 from mcstudy.sensitivity.given_data import FEWEST_RUNS, measure_given_data
 from mcstudy.statistics import Estimate
@@ -68,6 +68,7 @@ def analyse(
         "kind": study.kind,
         "runs": len(everything),
         "status": status_counts(everything),
+        "endings": endings(everything, complete_status(models[first])),
         "failures": locate_failures(everything[list(study.inputs)], ~complete.to_numpy(dtype=bool)),
         "models": {
             label: {"name": model.name, "version": model.version, "ignored": ignored[label],

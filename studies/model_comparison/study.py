@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mcstudy import config
+from mcstudy.cluster import Workers
 from mcstudy.config import ModelComparison, MonteCarloStudy, load_study
 from mcstudy.errors import UserError
 from mcstudy.results import ResultsFolder
@@ -27,7 +28,7 @@ def run_comparison(
     text: str,
     folder: ResultsFolder,
     *,
-    workers: int = -1,
+    workers: Workers = -1,
     quiet: bool = False,
 ) -> dict[str, Any]:
     """Run all models of a comparison, or go on with them, and write its results folder.
@@ -36,7 +37,8 @@ def run_comparison(
     ----------
     study : ModelComparison
     text : the study file as written. folder : ResultsFolder
-    workers : processes, -1 for one a core. quiet : no progress line.
+    workers : processes, -1 for one a core, or the address of a dask scheduler.
+    quiet : no progress line.
 
     Returns
     -------
@@ -78,7 +80,9 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
     if not isinstance(study, ModelComparison):
         raise UserError(f"{folder.path}: is not the folder of a model comparison")
     models = {label: load_study_model(cell_study(study, label)) for label in study.models}
-    runs = {label: cell_runs(folder, label, study.design.n) for label in study.models}
+    runs = {
+        label: cell_runs(folder, label, study.design.n, model) for label, model in models.items()
+    }
     nominal = {label: cell_folder(folder, label).read_json(NOMINAL) for label in study.models}
     analysis = analyse(study, models, runs, nominal, compared_outputs(study, models))
     subtitle = (
@@ -99,7 +103,8 @@ def cell_study(study: ModelComparison, label: str) -> MonteCarloStudy:
         format=study.format, kind="monte-carlo", name=study.name, title=study.title,
         seed=study.seed, model=study.models[label], fixed=study.fixed, design=study.design,
         inputs=study.inputs, dependence=study.dependence,
-        max_failure_rate=study.max_failure_rate, report=Report(histories=0),
+        max_failure_rate=study.max_failure_rate, run_time=study.run_time,
+        report=Report(histories=0),
     )  # fmt: skip
 
 

@@ -7,12 +7,13 @@ import numpy as np
 import pandas as pd
 
 from mcstudy import config, statistics, units
+from mcstudy.cluster import Workers
 from mcstudy.config import MonteCarloStudy, load_study
 from mcstudy.errors import UserError
 from mcstudy.figures import distributions, relations
 from mcstudy.results import ResultsFolder
 from models.protocol import Model, complete_status
-from studies.execution import describe_runs, load_study_model, publish, run_rows
+from studies.execution import columns_of, describe_runs, load_study_model, publish, run_rows
 from studies.failure_report import failure_map
 from studies.monte_carlo.report import sections_of
 
@@ -22,7 +23,7 @@ def run_monte_carlo(
     text: str,
     folder: ResultsFolder,
     *,
-    workers: int = -1,
+    workers: Workers = -1,
     quiet: bool = False,
 ) -> dict[str, Any]:
     """Run a study, or go on with it, and write its results folder.
@@ -34,7 +35,7 @@ def run_monte_carlo(
         The study file as written.
     folder : ResultsFolder
     workers : int
-        Processes; -1 for one a core.
+        Processes, -1 for one a core, or the address of a dask scheduler.
     quiet : bool
         No progress line.
 
@@ -79,7 +80,7 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
     if not isinstance(study, MonteCarloStudy):
         raise UserError(f"{folder.path}: is not the folder of a Monte Carlo study")
     model = load_study_model(study)
-    runs = folder.runs()
+    runs = folder.runs(columns_of(model))
     runs = runs[runs["run"] < study.design.n]
     subtitle = (
         f"Monte Carlo study of {len(runs):,} runs of the {model.name} model, "

@@ -5,6 +5,7 @@ from typing import Any
 import pandas as pd
 
 from mcstudy import config
+from mcstudy.cluster import Workers
 from mcstudy.config import MorrisStudy, load_study
 from mcstudy.errors import StudyError, UserError
 from mcstudy.results import ResultsFolder
@@ -21,7 +22,7 @@ def run_morris(
     text: str,
     folder: ResultsFolder,
     *,
-    workers: int = -1,
+    workers: Workers = -1,
     quiet: bool = False,
 ) -> dict[str, Any]:
     """Run a Morris study, or go on with it, and write its results folder.
@@ -30,7 +31,8 @@ def run_morris(
     ----------
     study : MorrisStudy
     text : the study file as written. folder : ResultsFolder
-    workers : processes, -1 for one a core. quiet : no progress line.
+    workers : processes, -1 for one a core, or the address of a dask scheduler.
+    quiet : no progress line.
 
     Returns
     -------
@@ -76,8 +78,7 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
     if not isinstance(study, MorrisStudy):
         raise UserError(f"{folder.path}: is not the folder of a Morris study")
     model = load_study_model(study)
-    manifest = folder.read_json("manifest.json")
-    runs = whole_prefix(folder, manifest["design"])
+    runs = whole_prefix(folder, model)
     analysis = analyse(study, model, runs)
     subtitle = (
         f"Morris screening by {len(runs):,} runs of the {model.name} model: "

@@ -15,7 +15,7 @@ from mcstudy.sensitivity.given_data import measure_given_data
 from mcstudy.sensitivity.saltelli import is_base_row
 from mcstudy.statistics import Estimate
 from models.protocol import complete_status
-from studies.execution import load_study_model, publish
+from studies.execution import columns_of, load_study_model, publish
 from studies.main_effects import main_effects_of
 from studies.sensitivity.report import draw, sections_of
 
@@ -65,7 +65,7 @@ def measure_sensitivity(
     if outputs:
         config.check_outputs(outputs, model, "--output")
     wanted = list(outputs or config.report_outputs(study, model))
-    runs = _independent(source, source.runs())
+    runs = _independent(source, source.runs(columns_of(model)))
     complete = runs[runs["status"].isin(complete_status(model))]
     inputs = list(study.inputs)
     analysis: dict[str, Any] = {
@@ -107,8 +107,7 @@ def measure_sensitivity(
 
 def _independent(source: ResultsFolder, runs: pd.DataFrame) -> pd.DataFrame:
     """Return the runs that were drawn independently: of Saltelli's blocks the rows of A and B."""
-    design = source.read_json("manifest.json").get("design", {})
-    block = int(design.get("block", 1))
+    block = source.design()["block"]
     if block == 1:
         return runs
     return runs[is_base_row(runs["run"].to_numpy(), block)]

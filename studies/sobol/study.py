@@ -3,6 +3,7 @@
 from typing import Any
 
 from mcstudy import config
+from mcstudy.cluster import Workers
 from mcstudy.config import SobolStudy, load_study
 from mcstudy.errors import UserError
 from mcstudy.progress import say
@@ -18,7 +19,7 @@ def run_sobol(
     text: str,
     folder: ResultsFolder,
     *,
-    workers: int = -1,
+    workers: Workers = -1,
     quiet: bool = False,
 ) -> dict[str, Any]:
     """Run a Sobol' study, or go on with it, and write its results folder.
@@ -31,7 +32,8 @@ def run_sobol(
     ----------
     study : SobolStudy
     text : the study file as written. folder : ResultsFolder
-    workers : processes, -1 for one a core. quiet : no progress line.
+    workers : processes, -1 for one a core, or the address of a dask scheduler.
+    quiet : no progress line.
 
     Returns
     -------
@@ -88,8 +90,7 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
     if not isinstance(study, SobolStudy):
         raise UserError(f"{folder.path}: is not the folder of a Sobol' study")
     model = load_study_model(study)
-    manifest = folder.read_json("manifest.json")
-    runs = whole_prefix(folder, manifest["design"])
+    runs = whole_prefix(folder, model)
     analysis = analyse(study, model, runs)
     subtitle = (
         f"Sobol' study of {len(runs):,} runs of the {model.name} model: "

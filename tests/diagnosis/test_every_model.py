@@ -62,6 +62,7 @@ def isomme_of(source: Path, folder: Path) -> None:
         )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_isomme_tests_are_diagnosed_with_the_model_of_a_study_file(tmp_path: Path) -> None:
     laboratory = Laboratory(tests=8, speed_sd=0.0)
     hidden = [Hidden("sensor_saturation", "", {"limit": 110.0})]

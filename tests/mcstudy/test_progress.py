@@ -3,6 +3,8 @@
 import io
 import re
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from mcstudy.progress import Progress
@@ -15,11 +17,18 @@ class Terminal(io.StringIO):
         return True
 
 
+def arrived(**counts: int) -> pd.DataFrame:
+    """Return runs by status, whose hic15 alternates between 90 and 110."""
+    status = [word for word, count in counts.items() for _ in range(count)]
+    hic15 = np.where(np.arange(len(status)) % 2, 90.0, 110.0)
+    return pd.DataFrame({"status": status, "hic15": hic15, "wad": np.nan})
+
+
 def session(progress: Progress, done: int = 0) -> None:
     """Run 100 runs, of which some are on disk already, in two chunks."""
     progress.start(total=100, done=done)
-    progress.advance(20, {"ok": 17, "unstable": 2, "no_head_contact": 1})
-    progress.advance(80 - done, {"ok": 80 - done})
+    progress.advance(arrived(ok=17, unstable=2, no_head_contact=1))
+    progress.advance(arrived(ok=80 - done))
     progress.finish()
 
 
@@ -29,7 +38,7 @@ def test_the_line_counts_on_a_terminal() -> None:
     session(progress)
     head, rest = stream.getvalue().split("\n", 1)
     assert head.startswith("100 runs;")
-    first, second = rest.lstrip("\r").split("\r")
+    first, second = rest.replace("\x1b[K", "").lstrip("\r").split("\r")
     assert first.startswith("20/100 done, 2 failed, ")
     assert second.startswith("100/100 done, 2 failed, ")
     assert re.search(r"\d+\.\d runs/s, 0 s left *\n$", second)
@@ -40,8 +49,8 @@ def test_a_resumed_session_says_what_is_there_already() -> None:
     stream = Terminal()
     session(Progress(stream=stream), done=30)
     assert "100 runs, 30 already done" in stream.getvalue()
-    assert "\r50/100 done, 3 failed" in stream.getvalue()
-    assert "\r100/100 done, 3 failed" in stream.getvalue()
+    assert "\r\x1b[K50/100 done, 3 failed" in stream.getvalue()
+    assert "\r\x1b[K100/100 done, 3 failed" in stream.getvalue()
 
 
 def test_nothing_is_said_of_a_study_that_is_done() -> None:
@@ -63,3 +72,17 @@ def test_silent_without_a_terminal_or_when_quiet(stream: io.StringIO, quiet: boo
 def test_standard_output_stays_clean(capsys: pytest.CaptureFixture[str]) -> None:
     session(Progress())
     assert capsys.readouterr().out == ""
+
+
+def test_the_widest_interval_is_that_of_the_mean_known_worst() -> None:
+    stream = Terminal()
+    progress = Progress(stream=stream, watched=("hic15", "wad"))
+    progress.start(total=200, done=0)
+    assert progress.widest is None
+    for size in (3, 60, 37):
+        progress.advance(arrived(ok=size))
+    values = np.concatenate([arrived(ok=size)["hic15"] for size in (3, 60, 37)])
+    reach = 1.96 * values.std(ddof=1) / np.sqrt(values.size) / values.mean()
+    # Of wad no run has a value: nothing is said of it.
+    assert progress.widest == ("hic15", pytest.approx(reach, rel=1e-12))
+    assert f"hic15 ± {100.0 * reach:.2g} %" in stream.getvalue()

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from mcstudy.errors import StudyError, UserError
@@ -121,6 +123,9 @@ def test_a_torn_part_is_set_aside_and_its_runs_are_missing(
     content = torn.read_bytes()
     torn.write_bytes(content[: int(keep * len(content))])
     assert folder.runs()["run"].tolist() == [0, 1, 2, 3, 8, 9, 10, 11]
+    assert torn.exists()
+    with folder.open_for_writing():
+        assert folder.runs()["run"].tolist() == [0, 1, 2, 3, 8, 9, 10, 11]
     assert not torn.exists()
     assert torn.with_suffix(".broken").exists()
     folder.add_part(runs.iloc[4:8])
@@ -131,8 +136,21 @@ def test_a_torn_table_is_set_aside_and_the_parts_still_count(folder: ResultsFold
     runs = table()
     folder.add_part(runs.iloc[8:])
     (folder.path / "runs.parquet").write_bytes(b"PAR1 and then the power went")
-    assert folder.runs()["run"].tolist() == [8, 9, 10, 11]
+    with folder.open_for_writing():
+        assert folder.runs()["run"].tolist() == [8, 9, 10, 11]
     assert (folder.path / "runs.broken").exists()
+
+
+def test_a_table_with_another_number_than_was_written_is_set_aside(folder: ResultsFolder) -> None:
+    runs = table()
+    folder.add_part(runs)
+    part = next((folder.path / "parts").iterdir())
+    held = pq.read_table(part)
+    changed = held.set_column(
+        held.column_names.index("hic15"), "hic15", pa.array(np.full(len(runs), 700.0))
+    )
+    pq.write_table(changed, part)
+    assert folder.done() is None
 
 
 def test_a_folder_of_torn_files_only_holds_no_runs(folder: ResultsFolder) -> None:

@@ -1,8 +1,9 @@
 """What the workers of the runner's tests run: cheap, top-level, importable in a fresh process."""
 
 import os
+import re
 import time
-from typing import TypedDict
+from typing import NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +17,10 @@ UNSOLVED = 0.9
 
 
 class Fault(TypedDict):
-    """Where a worker process misbehaves; the driver, told by its process id, never does."""
+    """Which row goes wrong: the one with this x."""
 
-    driver: int
     x: float
+    kind: NotRequired[int]
 
 
 def evaluate(argument: object, rows: Array) -> tuple[Array, list[str]]:
@@ -30,20 +31,40 @@ def evaluate(argument: object, rows: Array) -> tuple[Array, list[str]]:
     return np.stack([rows[:, 0] + rows[:, 1], product], axis=1), status.tolist()
 
 
-def _in_faulty_worker(fault: Fault, rows: Array) -> bool:
-    return os.getpid() != fault["driver"] and bool((rows[:, 0] == fault["x"]).any())
+def evaluate_slowly(argument: float, rows: Array) -> tuple[Array, list[str]]:
+    """Take some time, in s, for every row."""
+    time.sleep(argument * len(rows))
+    return evaluate(None, rows)
+
+
+def _is_faulty(fault: Fault, rows: Array) -> bool:
+    return bool((rows[:, 0] == fault["x"]).any())
 
 
 def evaluate_and_die(fault: Fault, rows: Array) -> tuple[Array, list[str]]:
-    """Kill the worker process at one row, after the other chunks have had time to arrive."""
-    if _in_faulty_worker(fault, rows):
-        time.sleep(1.5)
+    """End the process at one row, without a word."""
+    if _is_faulty(fault, rows):
         os._exit(1)
-    return evaluate(None, rows)
+    return evaluate_slowly(0.002, rows)
 
 
 def evaluate_and_hang(fault: Fault, rows: Array) -> tuple[Array, list[str]]:
-    """Never come back from one row."""
-    if _in_faulty_worker(fault, rows):
-        time.sleep(600.0)
+    """Never come back from one row, and let nothing else in the process run either."""
+    if _is_faulty(fault, rows):
+        # A match that backtracks for ever does so in C, with the interpreter held.
+        re.fullmatch(r"(a+)+b", "a" * 64)
+    return evaluate_slowly(0.002, rows)
+
+
+def evaluate_and_raise(fault: Fault, rows: Array) -> tuple[Array, list[str]]:
+    """Raise at one row."""
+    if _is_faulty(fault, rows):
+        raise ValueError("a bug\nof two lines")
     return evaluate(None, rows)
+
+
+def evaluate_beyond(fault: Fault, rows: Array) -> tuple[Array, list[str]]:
+    """Give numbers that are none, as if all were well: NaN, infinity, a million."""
+    outputs, status = evaluate(None, rows)
+    outputs[rows[:, 0] == fault["x"], 0] = {0: np.nan, 1: np.inf, 2: 1e6}[fault["kind"]]
+    return outputs, status

@@ -1,0 +1,40 @@
+"""A study of the toy evaluation, run in a process of its own that is there to be killed."""
+
+import sys
+from pathlib import Path
+
+import joblib
+import numpy as np
+import toy_evaluation
+
+from mcstudy import designs, runner
+from mcstudy.progress import Progress
+from mcstudy.results import ResultsFolder
+
+N = 400
+SLOWNESS = 0.006
+"""s a row: the study takes about as long as its processes take to start."""
+
+
+def work() -> runner.Task:
+    """Return the study."""
+    return runner.Task(
+        evaluate=toy_evaluation.evaluate_slowly,
+        argument=SLOWNESS,
+        inputs=designs.draw("latin-hypercube", N, 20, 2, seed=5),
+        input_names=toy_evaluation.NAMES,
+        output_names=toy_evaluation.OUTPUTS,
+        replicate=np.arange(N) // 20,
+    )
+
+
+def main(path: Path, workers: int) -> None:
+    """Run the study, or go on with it."""
+    runner.CHUNK_TIME = 0.05
+    folder = ResultsFolder(path)
+    with folder.open_for_writing(), joblib.parallel_config(backend="loky", n_jobs=workers):
+        folder.compact(runner.run(work(), folder, Progress(quiet=True)))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]))

@@ -38,7 +38,11 @@ def _check_workers(value: int) -> int:
 
 
 Workers = Annotated[
-    int, typer.Option(help="Worker processes; -1 for one a core.", callback=_check_workers)
+    int,
+    typer.Option(
+        help="Worker processes; -1 for one a core, 1 for this process, which a crash would end.",
+        callback=_check_workers,
+    ),
 ]
 Cluster = Annotated[
     str | None,

@@ -243,6 +243,10 @@ def _run_parallel(task: Task, current: _Round, watch: Watch) -> Iterator[ChunkRe
         # The pool is gone for good; the next round gets a fresh one.
         get_reusable_executor().shutdown(wait=True, kill_workers=True)
         raise
+    except MemoryError:
+        raise StudyError(
+            "a run found no memory; what arrived is kept, run again with fewer --workers to resume"
+        ) from None
     except KeyboardInterrupt:
         if workers > 1 and not remote:
             # Nobody waits for the chunks that are under way.

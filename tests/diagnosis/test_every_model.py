@@ -84,6 +84,7 @@ def chosen(*names: str) -> tuple[Cause, ...]:
     return tuple(cause for cause in causes_of("multibody") if cause.name in names)
 
 
+@pytest.mark.slow
 def test_full_scale_tests_of_the_crash_core_show_a_clipped_signal(tmp_path: Path) -> None:
     make_crashes(tmp_path / "data", [Hidden("sensor_saturation", "", {"limit": 60.0})], 1, tests=3)
     data = load_measured(tmp_path / "data")

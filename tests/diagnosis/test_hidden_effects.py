@@ -78,7 +78,7 @@ def trial(tmp: Path, hidden: list[Hidden], seed: int, monkeypatch: pytest.Monkey
 @pytest.mark.parametrize(
     "hidden",
     [
-        Hidden("sensor_gain", "catalogue", {"factor": 1.06}),
+        pytest.param(Hidden("sensor_gain", "catalogue", {"factor": 1.06}), marks=pytest.mark.slow),
         pytest.param(
             Hidden("rate_dependent_hood", "dashpot", {"damping": 40.0}),
             marks=pytest.mark.slow,

@@ -12,6 +12,7 @@ import toy_evaluation
 from numpy.typing import NDArray
 
 from mcstudy import designs, runner
+from mcstudy.errors import StudyError
 from mcstudy.progress import Progress
 from mcstudy.results import ResultsFolder, digest
 
@@ -148,12 +149,17 @@ def test_one_run_is_a_study_too(folder: ResultsFolder) -> None:
 # -- going on --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt(), MemoryError()])
+@pytest.mark.parametrize(
+    ("error", "seen"), [(KeyboardInterrupt(), KeyboardInterrupt), (MemoryError(), StudyError)]
+)
 def test_an_interrupted_run_keeps_what_arrived_and_goes_on(
-    folder: ResultsFolder, reference: pd.DataFrame, error: BaseException
+    folder: ResultsFolder,
+    reference: pd.DataFrame,
+    error: BaseException,
+    seen: type[BaseException],
 ) -> None:
     work, recording = recorded(stop_after=5, error=error)
-    with pytest.raises(type(error)):
+    with pytest.raises(seen):
         run(work, folder)
     arrived = kept(folder)
     assert 0 < len(arrived) < N

@@ -1,8 +1,8 @@
-"""Where runs are done: processes of this machine, or a dask.distributed cluster.
+"""Runs on a dask.distributed cluster.
 
 joblib's own dask backend (1.6) waits for ever when a worker is lost: it notes the error on the
 future and never calls back. The backend here calls back with the loss, and the runner sees to it.
-It leans on private names of joblib, which it checks.
+It leans on private names of joblib, which it checks. To import this module imports dask.
 """
 
 import asyncio
@@ -19,10 +19,6 @@ from joblib import _dask
 
 from mcstudy.errors import UserError
 from mcstudy.runner import LostChunk
-
-Workers = int | str
-"""Processes of this machine (-1: one a core, two at least), or the address of a dask scheduler
-(``tcp://...``, or ``local`` for a cluster of this machine's own)."""
 
 CONNECT_TIME = 20.0
 """s in which a scheduler and a first worker must answer."""
@@ -88,21 +84,15 @@ class ClusterBackend(_dask.DaskDistributedBackend):  # type: ignore[misc]
 
 
 @contextlib.contextmanager
-def at_work(workers: Workers) -> Iterator[None]:
-    """Let the runner use processes of this machine, or a cluster.
+def on_cluster(address: str) -> Iterator[None]:
+    """Let the runner use the cluster of a scheduler.
 
     Raises
     ------
     UserError
         If the cluster's extra is not installed, or no scheduler or worker answers.
     """
-    if isinstance(workers, int):
-        # With a single process joblib runs it all here, where a crash takes the driver along.
-        n_jobs = max(2, os.cpu_count() or 1) if workers == -1 else workers
-        with joblib.parallel_config(backend="loky", n_jobs=n_jobs):
-            yield
-        return
-    with _client(workers) as client, joblib.parallel_config(backend=ClusterBackend(client=client)):
+    with _client(address) as client, joblib.parallel_config(backend=ClusterBackend(client=client)):
         yield
 
 

@@ -94,18 +94,22 @@ class ResultsFolder:
         target = self.path / name
         target.parent.mkdir(parents=True, exist_ok=True)
         with _replacing(target) as temporary:
-            table = pa.Table.from_pandas(frame, preserve_index=False)
-            # The digest travels in the file: what is read is what was written, or is torn.
-            metadata = {
-                **(table.schema.metadata or {}),
-                _DIGEST: digest(table.to_pandas()).encode(),
-            }
+            pq.write_table(pa.Table.from_pandas(frame, preserve_index=False), temporary)
+
+    def _write_runs(self, name: str, frame: pd.DataFrame) -> None:
+        """Write a table of runs at once, its digest in it: what is read is that, or is torn."""
+        target = self.path / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        table = pa.Table.from_pandas(frame, preserve_index=False)
+        held = {_DIGEST: digest(table.to_pandas()).encode()}
+        with _replacing(target) as temporary:
+            metadata = (table.schema.metadata or {}) | held
             pq.write_table(table.replace_schema_metadata(metadata), temporary)
 
     def add_part(self, frame: pd.DataFrame) -> None:
         """Keep a chunk of runs."""
         first = int(frame["run"].iloc[0])
-        self.write_frame(f"parts/part-{first:09d}-{len(frame):06d}.parquet", frame)
+        self._write_runs(f"parts/part-{first:09d}-{len(frame):06d}.parquet", frame)
 
     def add_histories(self, run: int, histories: Mapping[str, HistoryLike]) -> None:
         """Keep the time histories of a run, by group; ``history`` reads them back."""
@@ -115,7 +119,7 @@ class ResultsFolder:
 
     def compact(self, frame: pd.DataFrame) -> None:
         """Write ``runs.parquet`` and drop the parts."""
-        self.write_frame(RUNS, frame)
+        self._write_runs(RUNS, frame)
         for part in self._parts():
             part.unlink()
         with contextlib.suppress(OSError):
@@ -300,8 +304,8 @@ def read_runs(file: Path) -> pd.DataFrame:
 
 
 def digest(frame: pd.DataFrame) -> str:
-    """Return a digest of the numbers of a table, independent of how its runs were run."""
-    ordered = frame.sort_values("run") if "run" in frame.columns else frame
+    """Return a digest of the numbers of a table of runs, independent of how they were run."""
+    ordered = frame.sort_values("run")
     total = hashlib.sha256()
     for name in ordered.columns:
         column = ordered[name]

@@ -101,20 +101,6 @@ class _Pace:
         self.size = int(np.clip(CHUNK_TIME / self.cost, 1, min(fair, GROWTH * self.size)))
 
 
-@dataclass
-class _Round:
-    """Chunks that are sent and not yet back, of one set of workers."""
-
-    pace: _Pace
-    left: Ids
-
-    def chunks(self) -> Iterator[Ids]:
-        """Give chunks as the workers ask for them."""
-        while self.left.size:
-            chunk, self.left = self.left[: self.pace.size], self.left[self.pace.size :]
-            yield chunk
-
-
 @dataclass(frozen=True)
 class LostChunk:
     """What a cluster gives back in place of a chunk whose worker was lost, and why."""
@@ -175,10 +161,9 @@ def _run_missing(task: Task, missing: Ids, traces: Path) -> Iterator[ChunkResult
     lost = np.zeros(len(task.inputs), dtype=np.int64)
     while missing.size:
         arrived: list[Ids] = []
-        current = _Round(pace, missing)
         broken = False
         try:
-            for result in _run_parallel(task, current, watch):
+            for result in _run_parallel(task, missing, pace, watch):
                 arrived.append(result.ids)
                 yield result
         except BrokenProcessPool:
@@ -208,8 +193,17 @@ def _run_missing(task: Task, missing: Ids, traces: Path) -> Iterator[ChunkResult
             raise StudyError(_FRUITLESS)
 
 
-def _run_parallel(task: Task, current: _Round, watch: Watch) -> Iterator[ChunkResult]:
-    """Yield what comes back of a round's chunks, in whatever order."""
+def _chunks(missing: Ids, pace: _Pace) -> Iterator[Ids]:
+    """Give chunks as the workers ask for them, as large as the pace says by then."""
+    first = 0
+    while first < missing.size:
+        chunk = missing[first : first + pace.size]
+        first += chunk.size
+        yield chunk
+
+
+def _run_parallel(task: Task, missing: Ids, pace: _Pace, watch: Watch) -> Iterator[ChunkResult]:
+    """Yield what one set of workers gives back of the missing rows, in whatever order."""
     workers = effective_n_jobs(None)
     # With one worker joblib runs in this process, as it should: nothing to send, nothing to end.
     parallel = Parallel(
@@ -223,7 +217,7 @@ def _run_parallel(task: Task, current: _Round, watch: Watch) -> Iterator[ChunkRe
         # Another machine has no such folder; a slow run is ended there all the same.
         watch = {"folder": "", "limit": task.run_time}
     evaluate = _evaluation(task, watch if workers > 1 else None)
-    results = parallel(delayed(evaluate)(*_rows(task, ids)) for ids in current.chunks())
+    results = parallel(delayed(evaluate)(*_rows(task, ids)) for ids in _chunks(missing, pace))
     try:
         for result in results:
             if isinstance(result, LostChunk):
@@ -233,7 +227,7 @@ def _run_parallel(task: Task, current: _Round, watch: Watch) -> Iterator[ChunkRe
                         "workers and run again to resume"
                     )
                 continue
-            current.pace.learn(result)
+            pace.learn(result)
             yield result
     except (TimeoutError, multiprocessing.TimeoutError):
         raise StudyError(

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mcstudy.cluster import Workers
 from mcstudy.config import ModelComparison, Reconstruction, Study, load_study
 from mcstudy.errors import UserError
 from mcstudy.report import Table
 from mcstudy.results import ResultsFolder
+from mcstudy.workers import Workers
 from models.protocol import Run
 from studies.execution import columns_of, load_study_model
 from studies.injury import report as injury_report

@@ -12,11 +12,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mcstudy import config, runner
-from mcstudy.cluster import Workers, at_work
 from mcstudy.config import (
     CommonStudy,
     FactorStudy,
     InjuryStudy,
+    ModelComparison,
     MonteCarloStudy,
     SampledStudy,
 )
@@ -27,6 +27,7 @@ from mcstudy.progress import Progress
 from mcstudy.report import Section, render
 from mcstudy.results import ResultsFolder, check_failures, digest, status_counts
 from mcstudy.sensitivity.blocks import FEWEST_BLOCKS
+from mcstudy.workers import Workers, at_work
 from models.protocol import Model, complete_status
 from models.registry import load_model
 from studies import evaluation
@@ -97,7 +98,8 @@ def run_rows(
     folder.write_json("manifest.json", manifest)
     start = time.perf_counter()
     with at_work(workers):
-        progress = Progress(quiet=quiet, complete=complete, watched=watched_outputs(study, model))
+        watched = config.report_outputs(study, model)
+        progress = Progress(quiet=quiet, complete=complete, watched=watched)
         runs = runner.run(task, folder, progress)
     # A study that was larger before keeps its further runs.
     folder.compact(held if (held := folder.done()) is not None else runs)
@@ -111,11 +113,6 @@ def run_rows(
     folder.write_json("manifest.json", manifest)
     check_failures(counts, set(counts) - complete, study.max_failure_rate)
     return runs
-
-
-def watched_outputs(study: SampledStudy, model: Model) -> list[str]:
-    """Return the outputs whose intervals the live line shows: those that the report draws."""
-    return config.report_outputs(study, model)
 
 
 def columns_of(model: Model) -> list[str]:
@@ -161,15 +158,32 @@ def describe_runs(
     ----------
     study, model : of the runs. block : rows that belong together.
     """
-    complete: NDArray[np.bool_] = runs["status"].isin(complete_status(model)).to_numpy(dtype=bool)
-    ended = {
+    words = complete_status(model)
+    complete: NDArray[np.bool_] = runs["status"].isin(words).to_numpy(dtype=bool)
+    return describe_ends(study, runs, complete, words, block), complete
+
+
+def describe_ends(
+    study: MonteCarloStudy | FactorStudy | InjuryStudy | ModelComparison,
+    runs: pd.DataFrame,
+    complete: NDArray[np.bool_],
+    words: frozenset[str],
+    block: int = 1,
+) -> dict[str, Any]:
+    """Return how the runs of a study ended, as every analysis holds it.
+
+    Parameters
+    ----------
+    study, runs : of which. complete : (n,) of the runs. words : statuses that are no failure.
+    block : rows that belong together.
+    """
+    return {
         "kind": study.kind,
         "runs": len(runs),
         "status": status_counts(runs),
-        "endings": endings(runs, complete_status(model)),
+        "endings": endings(runs, words),
         "failures": locate_failures(runs[list(study.inputs)], ~complete, block),
     }
-    return ended, complete
 
 
 def judge_runs(

@@ -290,19 +290,9 @@ def simulate(
         # The mean speed brings the car exactly to where it is at the step's end.
         car_state(car_motion, memory[M_TICKS] * settings.tick, car)
         _apply_loads(
-            body,
-            table,
-            ellipsoids,
-            zones,
-            state,
-            length,
-            given,
-            motion,
-            loads,
-            contacts,
-            car,
-            power,
-        )
+            body, table, ellipsoids, zones, state, length, given,
+            motion, loads, contacts, car, power,
+        )  # fmt: skip
         given[link.car, GIVEN_X] = (car[0] - state[link.car, X]) / length
         link.write_place[0] = 0
         each_body(link.space, link.writer, link.write_data)

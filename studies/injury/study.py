@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 
 from mcstudy import config
-from mcstudy.cluster import Workers
 from mcstudy.config import InjuryStudy, load_study
 from mcstudy.errors import UserError
 from mcstudy.injury.functions import RiskFunction, risk_function
 from mcstudy.results import ResultsFolder
+from mcstudy.workers import Workers
 from models.protocol import Model
 from studies.cells import PreparedCell, cell_folder, cell_runs, run_cells
 from studies.execution import judge_runs, load_study_model, publish

@@ -13,12 +13,12 @@ from mcstudy import config, units
 from mcstudy.agreement import breaking_inputs, compare, split_variance
 from mcstudy.config import ModelComparison
 from mcstudy.errors import StudyError, UserError
-from mcstudy.failures import endings, locate_failures
 from mcstudy.results import check_failures, status_counts
 from mcstudy.sensitivity.given_data import FEWEST_RUNS, measure_given_data
 from mcstudy.statistics import Estimate
 from models.protocol import Model, complete_status
 from studies.cells import batch_of
+from studies.execution import describe_ends
 
 Array = NDArray[np.float64]
 
@@ -64,12 +64,9 @@ def analyse(
         label: {i.name: i.ignored for i in model.inputs if i.ignored and i.name in study.inputs}
         for label, model in models.items()
     }
-    analysis: dict[str, Any] = {
-        "kind": study.kind,
-        "runs": len(everything),
-        "status": status_counts(everything),
-        "endings": endings(everything, complete_status(models[first])),
-        "failures": locate_failures(everything[list(study.inputs)], ~complete.to_numpy(dtype=bool)),
+    words = complete_status(models[first])
+    held = complete.to_numpy(dtype=bool)
+    analysis: dict[str, Any] = describe_ends(study, everything, held, words) | {
         "models": {
             label: {"name": model.name, "version": model.version, "ignored": ignored[label],
                     "status": status_counts(runs[label])}

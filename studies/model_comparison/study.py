@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from mcstudy import config
-from mcstudy.cluster import Workers
 from mcstudy.config import ModelComparison, MonteCarloStudy, load_study
 from mcstudy.errors import UserError
 from mcstudy.results import ResultsFolder
 from mcstudy.schema import Report
+from mcstudy.workers import Workers
 from models.protocol import Model, Run
 from studies.cells import PreparedCell, cell_folder, cell_runs, run_cells
 from studies.execution import load_study_model, publish

@@ -7,11 +7,11 @@ import numpy as np
 import pandas as pd
 
 from mcstudy import config, statistics, units
-from mcstudy.cluster import Workers
 from mcstudy.config import MonteCarloStudy, load_study
 from mcstudy.errors import UserError
 from mcstudy.figures import distributions, relations
 from mcstudy.results import ResultsFolder
+from mcstudy.workers import Workers
 from models.protocol import Model, complete_status
 from studies.execution import columns_of, describe_runs, load_study_model, publish, run_rows
 from studies.failure_report import failure_map

@@ -15,10 +15,10 @@ import pytest
 from test_faults import complete
 
 from mcstudy import runner
-from mcstudy.cluster import at_work
 from mcstudy.errors import StudyError, UserError
 from mcstudy.progress import Progress
 from mcstudy.results import ResultsFolder, digest
+from mcstudy.workers import at_work
 
 pytest.importorskip("distributed")
 HERE = Path(__file__).parent

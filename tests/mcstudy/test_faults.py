@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -47,13 +48,11 @@ def fresh_workers() -> Iterator[None]:
     get_reusable_executor().shutdown(wait=True, kill_workers=True)
 
 
-def fault(**more: Any) -> toy_evaluation.Fault:
-    return {"x": float(task().inputs[GUILTY, 0]), **more}  # type: ignore[typeddict-item]
+def fault(kind: int = 0) -> toy_evaluation.Fault:
+    return {"x": float(task().inputs[GUILTY, 0]), "kind": kind}
 
 
 def faulty(evaluate: Any, **more: Any) -> runner.Task:
-    from dataclasses import replace
-
     return replace(task(evaluate=evaluate, argument=fault()), **more)
 
 
@@ -104,8 +103,6 @@ def test_a_row_that_raises_is_booked_with_its_reason(
 def test_a_number_that_is_none_is_never_ok(
     folder: ResultsFolder, reference: pd.DataFrame, kind: int, status: str, reason: str
 ) -> None:
-    from dataclasses import replace
-
     work = replace(
         task(evaluate=toy_evaluation.evaluate_beyond, argument=fault(kind=kind)),
         bounds=np.array([[0.0, 2.0], [-np.inf, np.inf]]),

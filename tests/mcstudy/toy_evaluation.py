@@ -3,7 +3,7 @@
 import os
 import re
 import time
-from typing import NotRequired, TypedDict
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,10 @@ UNSOLVED = 0.9
 
 
 class Fault(TypedDict):
-    """Which row goes wrong: the one with this x."""
+    """Which row goes wrong, the one with this x, and in which of several ways."""
 
     x: float
-    kind: NotRequired[int]
+    kind: int
 
 
 def evaluate(argument: object, rows: Array) -> tuple[Array, list[str]]:

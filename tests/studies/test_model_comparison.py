@@ -11,7 +11,7 @@ import pytest
 from headform_studies import INPUTS, without_figures
 
 from mcstudy import cli
-from mcstudy.config import load_study, parse_study
+from mcstudy.config import ModelComparison, load_study, parse_study
 from mcstudy.errors import StudyError, UserError
 from mcstudy.results import ResultsFolder, digest
 from models.registry import load_model
@@ -120,8 +120,8 @@ def test_published_methods_stand_beside_ours(hoods: ResultsFolder) -> None:
     assert published["peak_force"]["mean"] == pytest.approx(4500.0)
     for label in ("soft", "stiff"):
         study = load_study(hoods.path / "study.toml")
-        assert not isinstance(study, list)
-        options = study.models[label].options  # type: ignore[union-attr]
+        assert isinstance(study, ModelComparison)
+        options = study.models[label].options
         nominal = load_model("headform", options).run({}).outputs
         assert analysis["nominal"][label]["hic15"] == pytest.approx(nominal["hic15"])
     report = (hoods.path / "report.html").read_text(encoding="utf-8")

@@ -16,8 +16,10 @@ from models.crash.ellipsoids import build_ellipsoids
 from models.crash.surfaces import empty_contacts, push, update_surfaces
 from models.multibody.integration import correct, predict
 from models.multibody.joints import apply_joint_torques
+from models.multibody.kinematics import update_kinematics
 from models.multibody.setup import build_tree, place
-from models.multibody.tree import empty_loads, solve_accelerations, update_kinematics
+from models.multibody.sweeps import solve_accelerations
+from models.multibody.tree import empty_loads
 from models.pedestrian.anthropometry import SEGMENTS, Body
 from models.pedestrian.joints import Joints
 from models.pedestrian.posture import standing_posture

@@ -5,8 +5,9 @@ from numpy.typing import NDArray
 
 from models.compilation import kernel
 from models.multibody.joints import apply_joint_torques
+from models.multibody.kinematics import update_kinematics
 from models.multibody.setup import build_tree, place
-from models.multibody.tree import empty_loads, update_kinematics
+from models.multibody.tree import empty_loads
 from models.pedestrian.anthropometry import SEGMENTS, Body
 from models.pedestrian.joints import Joints
 from models.pedestrian.posture import standing_posture

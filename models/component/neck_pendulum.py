@@ -13,13 +13,9 @@ from models.compilation import kernel
 from models.criteria.units import STANDARD_GRAVITY
 from models.multibody.integration import correct, predict
 from models.multibody.joints import apply_joint_torques
-from models.multibody.tree import (
-    Tree,
-    empty_loads,
-    empty_motion,
-    solve_accelerations,
-    update_kinematics,
-)
+from models.multibody.kinematics import update_kinematics
+from models.multibody.sweeps import solve_accelerations
+from models.multibody.tree import Tree, empty_loads, empty_motion
 from models.pedestrian.anthropometry import SEGMENTS, Body
 from models.pedestrian.joints import Joints
 

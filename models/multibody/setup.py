@@ -10,7 +10,8 @@ from models.crash.first_contact import first_contact_shift, widen_gaps
 from models.crash.scenario import Scenario, build_scenario
 from models.crash.surfaces import empty_contacts, update_surfaces
 from models.effects.chain import EffectChain
-from models.multibody.tree import Motion, Tree, empty_motion, update_kinematics
+from models.multibody.kinematics import update_kinematics
+from models.multibody.tree import Motion, Tree, empty_motion
 from models.pedestrian.anthropometry import PARENTS, SEGMENTS, Body
 from models.pedestrian.posture import Posture, standing_posture
 from models.vehicle.profile import Vehicle

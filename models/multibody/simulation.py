@@ -11,15 +11,6 @@ from models.crash.body_contact import apply_road_contacts, apply_self_contacts
 from models.crash.car_contact import apply_car_contacts
 from models.crash.record import (
     NOT_FINITE,
-    R_ACCELERATION,
-    R_CENTRE,
-    R_HEAD_CAR,
-    R_HEAD_ROAD,
-    R_RELATIVE,
-    R_SPIN,
-    R_SPIN_RATE,
-    R_TIME,
-    R_ZONES,
     REST,
     REST_ON_CAR,
     REST_SPEED,
@@ -43,12 +34,10 @@ from models.crash.stepping import HEAD_FALL, HEAD_FORCE, head_meets_car
 from models.crash.surfaces import CHANNELS, update_surfaces
 from models.multibody.integration import correct, predict
 from models.multibody.joints import FRICTION_RATE, apply_joint_torques
-from models.multibody.tree import (
-    Tree,
-    centre_acceleration,
-    solve_accelerations,
-    update_kinematics,
-)
+from models.multibody.kinematics import update_kinematics
+from models.multibody.recording import write_frame, write_record
+from models.multibody.sweeps import solve_accelerations
+from models.multibody.tree import Tree
 from models.pedestrian.joints import TWIST_FRICTION, Joints
 from models.vehicle.motion import car_state
 
@@ -202,58 +191,6 @@ def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts):
 
 
 @inlined_kernel
-def _write_record(row, time, head, tree, road_surface, motion, loads, contacts, car, record):
-    record[row, R_TIME] = time
-    ax, ay, az = centre_acceleration(motion, loads, head)
-    record[row, R_ACCELERATION] = ax - road_surface.pull
-    record[row, R_ACCELERATION + 1] = ay
-    record[row, R_ACCELERATION + 2] = az + road_surface.weight
-    for k in range(3):
-        w, q = 0.0, 0.0
-        for j in range(3):
-            w += motion.rotation[head, j, k] * motion.angular_velocity[head, j]
-            q += motion.rotation[head, j, k] * loads.angular_acceleration[head, j]
-        record[row, R_SPIN + k] = w
-        record[row, R_SPIN_RATE + k] = q
-    # Velocity of the head's centre of gravity relative to the car-fixed point where it is.
-    ux = motion.velocity[head, 0] - car[3] + car[5] * (motion.centre[head, 1] - car[1])
-    uy = motion.velocity[head, 1] - car[4] - car[5] * (motion.centre[head, 0] - car[0])
-    cosine, sine = math.cos(car[2]), math.sin(car[2])
-    record[row, R_RELATIVE] = cosine * ux + sine * uy
-    record[row, R_RELATIVE + 1] = -sine * ux + cosine * uy
-    record[row, R_RELATIVE + 2] = motion.velocity[head, 2]
-    zones = contacts.zone_force.shape[0] - 1
-    force = 0.0
-    for j in range(zones):
-        force += contacts.segment_force[head, j]
-        record[row, R_ZONES + j] = contacts.zone_force[j]
-    record[row, R_ZONES + zones] = contacts.zone_force[zones]
-    record[row, R_HEAD_CAR] = force
-    record[row, R_HEAD_ROAD] = contacts.segment_force[head, zones]
-    total = 0.0
-    for k in range(3):
-        record[row, R_CENTRE + k] = 0.0
-    for i in range(tree.mass.shape[0]):
-        total += tree.mass[i]
-        for k in range(3):
-            record[row, R_CENTRE + k] += tree.mass[i] * motion.centre[i, k]
-    for k in range(3):
-        record[row, R_CENTRE + k] /= total
-
-
-@inlined_kernel
-def _write_frame(row, time, motion, contacts, car, frames):
-    n = motion.orientation.shape[0]
-    frames[row, 0] = time
-    frames[row, 1], frames[row, 2], frames[row, 3] = car[0], car[1], car[2]
-    for i in range(n):
-        for k in range(3):
-            frames[row, 4 + 7 * i + k] = contacts.centre[i, k]
-        for k in range(4):
-            frames[row, 7 + 7 * i + k] = motion.orientation[i, k]
-
-
-@inlined_kernel
 def _speeds(tree, motion):
     """Return the speed of the centre of gravity and the root mean square segment speed."""
     total, square = 0.0, 0.0
@@ -305,12 +242,10 @@ def simulate(
     reason = TIME_LIMIT
     while True:
         if rows < record.shape[0]:
-            _write_record(
-                rows, time, head, tree, road_surface, motion, loads, contacts, car, record
-            )
+            write_record(rows, time, head, tree, road_surface, motion, loads, contacts, car, record)
             rows += 1
         if ticks >= shots * settings.frame_every and shots < frames.shape[0]:
-            _write_frame(shots, time, motion, contacts, car, frames)
+            write_frame(shots, time, motion, contacts, car, frames)
             shots += 1
         if time >= settings.time_limit:
             break

@@ -14,16 +14,12 @@ from models.compilation import kernel
 from models.crash.record import S_STEPS
 from models.criteria import head_injury_criterion
 from models.multibody.integration import correct, predict
+from models.multibody.kinematics import update_kinematics
 from models.multibody.model import MultibodyModel
 from models.multibody.setup import build_crash, build_tree
 from models.multibody.simulation import empty_scratch
-from models.multibody.tree import (
-    Tree,
-    empty_loads,
-    empty_motion,
-    solve_accelerations,
-    update_kinematics,
-)
+from models.multibody.sweeps import solve_accelerations
+from models.multibody.tree import Tree, empty_loads, empty_motion
 from models.pedestrian.anthropometry import build_body
 from models.registry import load_model
 

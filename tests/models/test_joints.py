@@ -15,8 +15,9 @@ from tree_stepping import (
     rotations,
 )
 
+from models.multibody.kinematics import update_kinematics
 from models.multibody.setup import build_tree, place
-from models.multibody.tree import Motion, Tree, empty_motion, update_kinematics
+from models.multibody.tree import Motion, Tree, empty_motion
 from models.pedestrian.anthropometry import PARENTS, SEGMENTS, Body, build_body
 from models.pedestrian.joints import Joints, build_joints
 from models.pedestrian.posture import standing_posture

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from models.crash.ellipsoids import Ellipsoids, build_ellipsoids
 from models.crash.road import Road
 from models.multibody.joints import apply_joint_torques
+from models.multibody.kinematics import update_kinematics
 from models.multibody.setup import build_tree, place
-from models.multibody.tree import empty_loads, update_kinematics
+from models.multibody.tree import empty_loads
 from models.pedestrian.anthropometry import SEGMENTS, Body, build_body
 from models.pedestrian.joints import Joints, build_joints, elastic_energy
 from models.pedestrian.posture import Posture, running_posture

@@ -17,15 +17,10 @@ from tree_stepping import (
     world_inertia,
 )
 
+from models.multibody.kinematics import update_kinematics
 from models.multibody.setup import build_tree, place
-from models.multibody.tree import (
-    Motion,
-    Tree,
-    empty_loads,
-    empty_motion,
-    solve_accelerations,
-    update_kinematics,
-)
+from models.multibody.sweeps import solve_accelerations
+from models.multibody.tree import Motion, Tree, empty_loads, empty_motion
 from models.pedestrian.anthropometry import PARENTS, SEGMENTS, build_body
 from models.pedestrian.posture import standing_posture
 

@@ -7,15 +7,9 @@ from scipy.spatial.transform import Rotation
 from models.compilation import kernel
 from models.multibody.integration import correct, predict
 from models.multibody.joints import apply_joint_torques
-from models.multibody.tree import (
-    Loads,
-    Motion,
-    Tree,
-    empty_loads,
-    empty_motion,
-    solve_accelerations,
-    update_kinematics,
-)
+from models.multibody.kinematics import update_kinematics
+from models.multibody.sweeps import solve_accelerations
+from models.multibody.tree import Loads, Motion, Tree, empty_loads, empty_motion
 from models.pedestrian.joints import Joints
 
 Array = NDArray[np.float64]

@@ -14,9 +14,10 @@ from models.compilation import kernel
 from models.contact.law import KNOTS, contact_force, law_of
 from models.crash.ellipsoids import build_ellipsoids
 from models.crash.surfaces import empty_contacts, push, update_surfaces
-from models.multibody.integration import correct, predict
+from models.multibody.bushings import apply_bushings
+from models.multibody.integration import correct, empty_memory, predict
 from models.multibody.joints import apply_joint_torques
-from models.multibody.kinematics import update_kinematics
+from models.multibody.kinematics import seat_joints, update_kinematics
 from models.multibody.setup import build_tree, place
 from models.multibody.sweeps import solve_accelerations
 from models.multibody.tree import empty_loads
@@ -56,7 +57,7 @@ class BluntImpact:
 
 @kernel
 def _strike(
-    tree, joints, ellipsoids, motion, loads, contacts, spin, velocity, alpha, acceleration, power,
+    tree, joints, ellipsoids, motion, loads, contacts, memory, power,
     laws, count, segment, mass, speed, step, out,
 ):  # fmt: skip
     """Step until the record ``out`` (n, 2) of force and deflection is full."""
@@ -65,7 +66,7 @@ def _strike(
         old_force = force
         if k > 0:
             face -= step * rate - 0.5 * step * step * old_force / mass
-            predict(motion, loads, spin, velocity, alpha, acceleration, step)
+            predict(tree, motion, loads, memory, step)
         update_kinematics(tree, motion)
         update_surfaces(ellipsoids, motion, contacts)
         for i in range(tree.mass.shape[0]):
@@ -87,9 +88,10 @@ def _strike(
             -force, 0.0, 0.0,
         )  # fmt: skip
         apply_joint_torques(tree, joints, motion, loads, power)
+        apply_bushings(tree, joints, motion, loads, power)
         solve_accelerations(tree, motion, loads)
         if k > 0:
-            correct(motion, loads, spin, velocity, alpha, acceleration, step)
+            correct(tree, motion, loads, memory, step)
             rate -= 0.5 * step * (old_force + force) / mass
         out[k, 0] = force
         out[k, 1] = max(depth, 0.0)
@@ -111,11 +113,12 @@ def strike_region(
     count = law_of(build_tissue(body)[region], laws[0])
     ellipsoids = build_ellipsoids(body, build_tissue(body), [])
     out = np.zeros((round(DURATION / STEP), 2))
+    tree, motion = build_tree(body, joints.yields), place(standing_posture(body))
+    seat_joints(tree, motion)
     _strike(
-        build_tree(body), joints, ellipsoids, place(standing_posture(body)), empty_loads(n),
-        empty_contacts(n, 0, len(ellipsoids.pairs)), np.zeros((n, 3)), np.zeros(3),
-        np.zeros((n, 3)), np.zeros(3), np.zeros(2), laws, count, segment, impactor_mass, speed,
-        STEP, out,
+        tree, joints, ellipsoids, motion, empty_loads(n),
+        empty_contacts(n, 0, len(ellipsoids.pairs)), empty_memory(n), np.zeros(2), laws, count,
+        segment, impactor_mass, speed, STEP, out,
     )  # fmt: skip
     over = np.flatnonzero((out[:, 0] == 0.0) & (np.arange(len(out)) > np.argmax(out[:, 0])))
     end = int(over[0]) + 1 if over.size else len(out)

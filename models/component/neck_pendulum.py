@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from models.compilation import kernel
 from models.criteria.units import STANDARD_GRAVITY
-from models.multibody.integration import correct, predict
+from models.multibody.bushings import apply_bushings
+from models.multibody.integration import correct, empty_memory, predict
 from models.multibody.joints import apply_joint_torques
-from models.multibody.kinematics import update_kinematics
+from models.multibody.kinematics import seat_joints, update_kinematics
 from models.multibody.sweeps import solve_accelerations
 from models.multibody.tree import Tree, empty_loads, empty_motion
 from models.pedestrian.anthropometry import SEGMENTS, Body
@@ -58,7 +59,7 @@ class PendulumTest:
 
 @kernel
 def _swing(
-    tree, joints, motion, loads, spin, velocity, alpha, acceleration, power, rates, step, out
+    tree, joints, motion, loads, memory, power, rates, step, out
 ):  # fmt: skip
     """Step the pendulum through its angular accelerations ``rates`` (n,) about y, rad/s2.
 
@@ -67,7 +68,7 @@ def _swing(
     head = tree.mass.shape[0] - 1
     for k in range(rates.shape[0]):
         if k > 0:
-            predict(motion, loads, spin, velocity, alpha, acceleration, step)
+            predict(tree, motion, loads, memory, step)
         update_kinematics(tree, motion)
         for i in range(tree.mass.shape[0]):
             for j in range(3):
@@ -77,9 +78,10 @@ def _swing(
                 loads.force[i, 2] = -tree.mass[i] * STANDARD_GRAVITY
         loads.torque[0, 1] = rates[k] * tree.inertia[0, 1]
         apply_joint_torques(tree, joints, motion, loads, power)
+        apply_bushings(tree, joints, motion, loads, power)
         solve_accelerations(tree, motion, loads)
         if k > 0:
-            correct(motion, loads, spin, velocity, alpha, acceleration, step)
+            correct(tree, motion, loads, memory, step)
         # The head against the pendulum: conj(root) * head, whose x and z parts stay 0.
         w, x, y, z = motion.orientation[0]
         hw, hx, hy, hz = motion.orientation[head]
@@ -123,20 +125,21 @@ def swing_neck(
         centre_from_joint=np.vstack([np.zeros(3), body.centre[rows] - body.joint[rows]]),
         mass=np.array([HEAVY, *body.mass[rows]]),
         inertia=np.vstack([np.full(3, HEAVY), body.inertia[rows]]),
+        yields=joints.yields[chain],
     )
     held = Joints(*(np.ascontiguousarray(array[chain]) for array in joints))
     n = len(chain)
     motion, loads = empty_motion(n), empty_loads(n)
     motion.orientation[:] = _FACING[direction]
     motion.angular_velocity[:, 1] = -speed / GAUGE
+    seat_joints(tree, motion)
     time: Array = np.arange(round(DURATION / STEP) + 1, dtype=np.float64) * STEP
     lost = np.interp(time, pulse[:, 0], pulse[:, 1])
     # Each step's loss at its end, with none at the start: the trapezoidal sum is the whole loss.
     rates = np.diff(lost, prepend=0.0) / (STEP * GAUGE)
     out = np.zeros((time.size, 3))
     _swing(
-        tree, held, motion, loads, np.zeros((n, 3)), np.zeros(3), np.zeros((n, 3)), np.zeros(3),
-        np.zeros(2), rates, STEP, out,
+        tree, held, motion, loads, empty_memory(n), np.zeros(2), rates, STEP, out,
     )  # fmt: skip
     # The pendulum's own y axis points to the right when the body faces the way of the swing.
     sign = 1.0 if direction == "flexion" else -1.0

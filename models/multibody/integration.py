@@ -7,46 +7,85 @@ the velocity-dependent terms)::
     a1 = a(x1, v*)                   v1 = v0 + h/2 (a0 + a1)
 
 For forces of position alone it is symplectic; damping is stable while its rate is below ``1/h``.
+Stepped are the root's centre of mass, the joint points that yield, and all orientations.
 """
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from models.compilation import inlined_kernel
 from models.rotation import rotate_quaternion
 
+Array = NDArray[np.float64]
+
+
+class Memory(NamedTuple):
+    """Rates at the start of a step, of ``n`` segments.
+
+    Attributes
+    ----------
+    spin, spin_rate : (n, 3) rad/s, rad/s2. velocity, acceleration : (n, 3) m/s, m/s2, of the root's
+        centre of mass (row 0) and of joint points that yield.
+    """
+
+    spin: Array
+    spin_rate: Array
+    velocity: Array
+    acceleration: Array
+
+
+def empty_memory(n: int) -> Memory:
+    """Return the memory for ``n`` segments."""
+    return Memory(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)))
+
 
 @inlined_kernel
-def predict(motion, loads, old_spin, old_velocity, old_alpha, old_acceleration, h):
+def predict(tree, motion, loads, memory, h):
     """Advance positions by ``h`` seconds, keep the old rates, and predict the new ones."""
     n = motion.orientation.shape[0]
     half = 0.5 * h * h
     for k in range(3):
-        old_velocity[k] = motion.root_velocity[k]
-        old_acceleration[k] = loads.joint_acceleration[0, k]
-        motion.root_position[k] += h * old_velocity[k] + half * old_acceleration[k]
-        motion.root_velocity[k] += h * old_acceleration[k]
+        memory.velocity[0, k] = motion.root_velocity[k]
+        memory.acceleration[0, k] = loads.joint_acceleration[0, k]
+        motion.root_position[k] += h * memory.velocity[0, k] + half * memory.acceleration[0, k]
+        motion.root_velocity[k] += h * memory.acceleration[0, k]
     for i in range(n):
         for k in range(3):
-            old_spin[i, k] = motion.angular_velocity[i, k]
-            old_alpha[i, k] = loads.angular_acceleration[i, k]
-            motion.angular_velocity[i, k] += h * old_alpha[i, k]
+            memory.spin[i, k] = motion.angular_velocity[i, k]
+            memory.spin_rate[i, k] = loads.angular_acceleration[i, k]
+            motion.angular_velocity[i, k] += h * memory.spin_rate[i, k]
         rotate_quaternion(
             motion.orientation,
             i,
-            h * old_spin[i, 0] + half * old_alpha[i, 0],
-            h * old_spin[i, 1] + half * old_alpha[i, 1],
-            h * old_spin[i, 2] + half * old_alpha[i, 2],
+            h * memory.spin[i, 0] + half * memory.spin_rate[i, 0],
+            h * memory.spin[i, 1] + half * memory.spin_rate[i, 1],
+            h * memory.spin[i, 2] + half * memory.spin_rate[i, 2],
         )
+        if tree.yields[i]:
+            for k in range(3):
+                memory.velocity[i, k] = motion.joint_velocity[i, k]
+                memory.acceleration[i, k] = loads.joint_acceleration[i, k]
+                motion.joint[i, k] += h * memory.velocity[i, k] + half * memory.acceleration[i, k]
+                motion.joint_velocity[i, k] += h * memory.acceleration[i, k]
 
 
 @inlined_kernel
-def correct(motion, loads, old_spin, old_velocity, old_alpha, old_acceleration, h):
+def correct(tree, motion, loads, memory, h):
     """Replace the predicted rates by the trapezoidal ones."""
     half = 0.5 * h
     for k in range(3):
-        motion.root_velocity[k] = old_velocity[k] + half * (
-            old_acceleration[k] + loads.joint_acceleration[0, k]
+        motion.root_velocity[k] = memory.velocity[0, k] + half * (
+            memory.acceleration[0, k] + loads.joint_acceleration[0, k]
         )
     for i in range(motion.orientation.shape[0]):
         for k in range(3):
-            motion.angular_velocity[i, k] = old_spin[i, k] + half * (
-                old_alpha[i, k] + loads.angular_acceleration[i, k]
+            motion.angular_velocity[i, k] = memory.spin[i, k] + half * (
+                memory.spin_rate[i, k] + loads.angular_acceleration[i, k]
             )
+        if tree.yields[i]:
+            for k in range(3):
+                motion.joint_velocity[i, k] = memory.velocity[i, k] + half * (
+                    memory.acceleration[i, k] + loads.joint_acceleration[i, k]
+                )

@@ -1,6 +1,39 @@
 """Places and velocities of all segments from the generalised state of the tree."""
 
-from models.compilation import inlined_kernel
+from models.compilation import inlined_kernel, kernel
+
+
+@inlined_kernel
+def _hang(tree, motion, i, p):
+    """Put the joint point of a segment, with its velocity, where its parent has it."""
+    a0 = tree.joint_in_parent[i, 0]
+    a1 = tree.joint_in_parent[i, 1]
+    a2 = tree.joint_in_parent[i, 2]
+    dx = (
+        motion.rotation[p, 0, 0] * a0
+        + motion.rotation[p, 0, 1] * a1
+        + motion.rotation[p, 0, 2] * a2
+    )
+    dy = (
+        motion.rotation[p, 1, 0] * a0
+        + motion.rotation[p, 1, 1] * a1
+        + motion.rotation[p, 1, 2] * a2
+    )
+    dz = (
+        motion.rotation[p, 2, 0] * a0
+        + motion.rotation[p, 2, 1] * a1
+        + motion.rotation[p, 2, 2] * a2
+    )
+    ux = motion.angular_velocity[p, 0]
+    uy = motion.angular_velocity[p, 1]
+    uz = motion.angular_velocity[p, 2]
+    motion.lever[i, 0], motion.lever[i, 1], motion.lever[i, 2] = dx, dy, dz
+    motion.joint[i, 0] = motion.joint[p, 0] + dx
+    motion.joint[i, 1] = motion.joint[p, 1] + dy
+    motion.joint[i, 2] = motion.joint[p, 2] + dz
+    motion.joint_velocity[i, 0] = motion.joint_velocity[p, 0] + uy * dz - uz * dy
+    motion.joint_velocity[i, 1] = motion.joint_velocity[p, 1] + uz * dx - ux * dz
+    motion.joint_velocity[i, 2] = motion.joint_velocity[p, 2] + ux * dy - uy * dx
 
 
 @inlined_kernel
@@ -35,34 +68,12 @@ def update_kinematics(tree, motion):
                 motion.joint[i, k] = motion.root_position[k]
                 motion.joint_velocity[i, k] = motion.root_velocity[k]
         else:
-            a0 = tree.joint_in_parent[i, 0]
-            a1 = tree.joint_in_parent[i, 1]
-            a2 = tree.joint_in_parent[i, 2]
-            dx = (
-                motion.rotation[p, 0, 0] * a0
-                + motion.rotation[p, 0, 1] * a1
-                + motion.rotation[p, 0, 2] * a2
-            )
-            dy = (
-                motion.rotation[p, 1, 0] * a0
-                + motion.rotation[p, 1, 1] * a1
-                + motion.rotation[p, 1, 2] * a2
-            )
-            dz = (
-                motion.rotation[p, 2, 0] * a0
-                + motion.rotation[p, 2, 1] * a1
-                + motion.rotation[p, 2, 2] * a2
-            )
-            ux = motion.angular_velocity[p, 0]
-            uy = motion.angular_velocity[p, 1]
-            uz = motion.angular_velocity[p, 2]
-            motion.lever[i, 0], motion.lever[i, 1], motion.lever[i, 2] = dx, dy, dz
-            motion.joint[i, 0] = motion.joint[p, 0] + dx
-            motion.joint[i, 1] = motion.joint[p, 1] + dy
-            motion.joint[i, 2] = motion.joint[p, 2] + dz
-            motion.joint_velocity[i, 0] = motion.joint_velocity[p, 0] + uy * dz - uz * dy
-            motion.joint_velocity[i, 1] = motion.joint_velocity[p, 1] + uz * dx - ux * dz
-            motion.joint_velocity[i, 2] = motion.joint_velocity[p, 2] + ux * dy - uy * dx
+            if tree.yields[i]:
+                # The joint point is where its own motion has brought it.
+                for k in range(3):
+                    motion.lever[i, k] = motion.joint[i, k] - motion.joint[p, k]
+            else:
+                _hang(tree, motion, i, p)
         s0 = tree.centre_from_joint[i, 0]
         s1 = tree.centre_from_joint[i, 1]
         s2 = tree.centre_from_joint[i, 2]
@@ -76,6 +87,21 @@ def update_kinematics(tree, motion):
         motion.velocity[i, 0] = motion.joint_velocity[i, 0] + wy * rz - wz * ry
         motion.velocity[i, 1] = motion.joint_velocity[i, 1] + wz * rx - wx * rz
         motion.velocity[i, 2] = motion.joint_velocity[i, 2] + wx * ry - wy * rx
+
+
+@kernel
+def seat_joints(tree, motion):
+    """Put the points of all joints that yield, with their velocities, where the parents have them.
+
+    For a state that was given by the root and the segments' orientations; leaves the kinematics up
+    to date.
+    """
+    for i in range(tree.mass.shape[0]):
+        # Parents come before children: what hangs on a yielding joint follows it.
+        update_kinematics(tree, motion)
+        if tree.yields[i]:
+            _hang(tree, motion, i, tree.parent[i])
+    update_kinematics(tree, motion)
 
 
 @inlined_kernel

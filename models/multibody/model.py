@@ -12,14 +12,8 @@ from models.crash.surfaces import CHANNELS, empty_contacts
 from models.declaration import read_inputs, read_outputs
 from models.effects.registry import effects_of
 from models.multibody.setup import Crash, build_crash
-from models.multibody.simulation import (
-    STABLE,
-    Settings,
-    damping_rate,
-    empty_scratch,
-    simulate,
-    stable_ticks,
-)
+from models.multibody.simulation import Settings, empty_scratch, simulate
+from models.multibody.stability import STABLE, joint_rate, stable_ticks
 from models.multibody.tree import empty_loads
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
 
@@ -54,7 +48,7 @@ class MultibodyModel(CrashModel):
         """
         n, zones = len(SEGMENTS), len(self.vehicle.zones)
         scenario = crash.scenario
-        rate = damping_rate(crash.tree, scenario.joints)
+        rate = joint_rate(crash.tree, scenario.joints)
         # A light body with stiff joints takes a finer step than asked for.
         tick = self.tick / max(1, math.ceil(rate * self.tick / STABLE))
         record = self._record

@@ -4,13 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.compilation import kernel
 from models.crash.first_contact import first_contact_shift, widen_gaps
 from models.crash.scenario import Scenario, build_scenario
 from models.crash.surfaces import empty_contacts, update_surfaces
 from models.effects.chain import EffectChain
-from models.multibody.kinematics import update_kinematics
+from models.multibody.kinematics import seat_joints
 from models.multibody.tree import Motion, Tree, empty_motion
 from models.pedestrian.anthropometry import PARENTS, SEGMENTS, Body
 from models.pedestrian.posture import Posture, standing_posture
@@ -26,8 +27,14 @@ class Crash:
     motion: Motion
 
 
-def build_tree(body: Body) -> Tree:
-    """Return the tree of a body."""
+def build_tree(body: Body, yields: NDArray[np.bool_] | None = None) -> Tree:
+    """Return the tree of a body.
+
+    Parameters
+    ----------
+    body : Body
+    yields : (n,) which joints yield, as in ``Joints``; by default none.
+    """
     n = len(SEGMENTS)
     reference = body.joint.copy()
     reference[0] = body.centre[0]
@@ -41,6 +48,7 @@ def build_tree(body: Body) -> Tree:
         centre_from_joint=body.centre - reference,
         mass=body.mass.copy(),
         inertia=body.inertia.copy(),
+        yields=np.zeros(n, dtype=np.bool_) if yields is None else yields,
     )
 
 
@@ -56,7 +64,7 @@ def place(posture: Posture) -> Motion:
 
 @kernel
 def _update(tree, ellipsoids, motion, contacts):
-    update_kinematics(tree, motion)
+    seat_joints(tree, motion)
     update_surfaces(ellipsoids, motion, contacts)
 
 
@@ -74,7 +82,7 @@ def build_crash(
     """
     scenario = build_scenario(inputs, vehicle, chain)
     ellipsoids = scenario.ellipsoids
-    tree = build_tree(scenario.body)
+    tree = build_tree(scenario.body, scenario.joints.yields)
     motion = place(scenario.posture)
     scratch = empty_contacts(len(SEGMENTS), len(vehicle.zones), len(ellipsoids.pairs))
     for state in (place(standing_posture(scenario.body)), motion):
@@ -86,4 +94,5 @@ def build_crash(
     if np.isnan(shift):
         return None
     motion.root_position[0] += shift
+    seat_joints(tree, motion)
     return Crash(scenario, tree, motion)

@@ -32,13 +32,12 @@ from models.crash.record import (
 )
 from models.crash.stepping import HEAD_FALL, HEAD_FORCE, head_meets_car
 from models.crash.surfaces import CHANNELS, update_surfaces
-from models.multibody.integration import correct, predict
-from models.multibody.joints import FRICTION_RATE, apply_joint_torques
+from models.multibody.bushings import apply_bushings
+from models.multibody.integration import Memory, correct, empty_memory, predict
+from models.multibody.joints import apply_joint_torques
 from models.multibody.kinematics import update_kinematics
 from models.multibody.recording import write_frame, write_record
 from models.multibody.sweeps import solve_accelerations
-from models.multibody.tree import Tree
-from models.pedestrian.joints import TWIST_FRICTION, Joints
 from models.vehicle.motion import car_state
 
 Array = NDArray[np.float64]
@@ -50,18 +49,12 @@ class Scratch(NamedTuple):
     car: Array
     power: Array
     old_power: Array
-    old_spin: Array
-    old_alpha: Array
-    old_velocity: Array
-    old_acceleration: Array
+    memory: Memory
 
 
 def empty_scratch(n: int) -> Scratch:
     """Return the workspace for ``n`` segments."""
-    return Scratch(
-        np.zeros(6), np.zeros(CHANNELS), np.zeros(CHANNELS),
-        np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(3), np.zeros(3),
-    )  # fmt: skip
+    return Scratch(np.zeros(6), np.zeros(CHANNELS), np.zeros(CHANNELS), empty_memory(n))
 
 
 class Settings(NamedTuple):
@@ -83,40 +76,6 @@ class Settings(NamedTuple):
     frame_every: int
     head: int
     trunk: int
-
-
-def damping_rate(tree: Tree, joints: Joints) -> float:
-    """Return the largest damping rate (1/s) of a segment.
-
-    A segment's rate is the damping of its joints over its inertia, to which its children's masses
-    add about the transverse axes.
-    """
-    n = tree.mass.size
-    damping = joints.damping + joints.friction[:, None] / FRICTION_RATE * [
-        1.0,
-        1.0,
-        TWIST_FRICTION,
-    ]
-    total = damping.copy()
-    inertia = tree.inertia.copy()
-    lever = np.linalg.norm(tree.centre_from_joint, axis=1)
-    inertia[:, :2] += (tree.mass * lever**2)[:, None]
-    for i in range(1, n):
-        parent = tree.parent[i]
-        total[parent] += damping[i]
-        inertia[parent, :2] += tree.mass[i] * float(
-            tree.joint_in_parent[i] @ tree.joint_in_parent[i]
-        )
-    return float((total / inertia)[1:].max())
-
-
-STABLE = 0.5
-"""Largest damping rate times step; the integrator is stable below 1."""
-
-
-def stable_ticks(rate: float, tick: float, wanted: int) -> int:
-    """Return how many ticks, one to ``wanted``, a step may take with a damping rate (1/s)."""
-    return min(wanted, max(1, int(STABLE / (rate * tick))))
 
 
 @inlined_kernel
@@ -155,6 +114,7 @@ def evaluate(tree, joints, ellipsoids, zones, road_surface, car, motion, loads, 
         loads.torque[i, 2] = 0.0
     update_surfaces(ellipsoids, motion, contacts)
     apply_joint_torques(tree, joints, motion, loads, power)
+    apply_bushings(tree, joints, motion, loads, power)
     apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, power)
     apply_road_contacts(zones, ellipsoids, road_surface, motion, loads, contacts, tree, power)
     apply_self_contacts(ellipsoids, motion, loads, contacts, tree, power)
@@ -226,8 +186,7 @@ def simulate(
     summary : (SUMMARY,), filled.
     """
     car, power, old_power = scratch.car, scratch.power, scratch.old_power
-    old_spin, old_alpha = scratch.old_spin, scratch.old_alpha
-    old_velocity, old_acceleration = scratch.old_velocity, scratch.old_acceleration
+    memory = scratch.memory
     head = settings.head
     road = zones.radius.shape[0]
     time = 0.0
@@ -256,13 +215,13 @@ def simulate(
             old_power[k] = power[k]
         jump = _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts)
         h = jump * settings.tick
-        predict(motion, loads, old_spin, old_velocity, old_alpha, old_acceleration, h)
+        predict(tree, motion, loads, memory, h)
         steps += 1
         ticks += jump
         time = ticks * settings.tick
         car_state(car_motion, time, car)
         evaluate(tree, joints, ellipsoids, zones, road_surface, car, motion, loads, contacts, power)
-        correct(motion, loads, old_spin, old_velocity, old_alpha, old_acceleration, h)
+        correct(tree, motion, loads, memory, h)
         for k in range(CHANNELS):
             work[k] += 0.5 * h * (old_power[k] + power[k])
         # The head on the car.

@@ -18,6 +18,12 @@ of mass, children c hanging at d_c with articulated masses M_c and bias forces b
 
 where ``[r]`` is the cross-product matrix. Eliminating alpha leaves the segment's own articulated
 mass ``M - K G^-1 K^T`` and bias ``p + K G^-1 (s - n)``.
+
+A joint that yields carries a force that is known from the stretch between its points (see
+``models.multibody.bushings``), as its torque is. Its child is then a second root: the articulated
+mass gives the joint point's acceleration at once, ``M a_J + b = f``, and the parent feels the force
+and the torque but no mass. So a compliant joint costs less than an exact one, and as its stiffness
+grows the motion tends to that of the exact joint.
 """
 
 from models.compilation import inlined_kernel
@@ -135,8 +141,11 @@ def _sweep_to_root(tree, motion, loads):
         bx = px - (X00 * nx + X01 * ny + X02 * nz)
         by = py - (X10 * nx + X11 * ny + X12 * nz)
         bz = pz - (X20 * nx + X21 * ny + X22 * nz)
-        if parent < 0:
-            # No force holds the root: M a + b = 0.
+        if parent < 0 or tree.yields[i]:
+            # The force at the joint is known: nothing at the root, its bushing's where it yields.
+            bx -= loads.joint_force[i, 0]
+            by -= loads.joint_force[i, 1]
+            bz -= loads.joint_force[i, 2]
             c00 = M11 * M22 - M12 * M12
             c01 = M02 * M12 - M01 * M22
             c02 = M01 * M12 - M02 * M11
@@ -147,6 +156,8 @@ def _sweep_to_root(tree, motion, loads):
             loads.joint_acceleration[i, 0] = inv * (c00 * bx + c01 * by + c02 * bz)
             loads.joint_acceleration[i, 1] = inv * (c01 * bx + c11 * by + c12 * bz)
             loads.joint_acceleration[i, 2] = inv * (c02 * bx + c12 * by + c22 * bz)
+            if parent >= 0:
+                _react(motion, loads, i, parent)
             continue
         dx, dy, dz = motion.lever[i, 0], motion.lever[i, 1], motion.lever[i, 2]
         ux = motion.angular_velocity[parent, 0]
@@ -192,11 +203,24 @@ def _sweep_to_root(tree, motion, loads):
 
 
 @inlined_kernel
+def _react(motion, loads, i, parent):
+    """Add what a joint that yields demands of the parent: its force and torque, no mass."""
+    dx, dy, dz = motion.lever[i, 0], motion.lever[i, 1], motion.lever[i, 2]
+    fx, fy, fz = loads.joint_force[i, 0], loads.joint_force[i, 1], loads.joint_force[i, 2]
+    loads.gathered[parent, 21] += fx
+    loads.gathered[parent, 22] += fy
+    loads.gathered[parent, 23] += fz
+    loads.gathered[parent, 24] += dy * fz - dz * fy + loads.joint_torque[i, 0]
+    loads.gathered[parent, 25] += dz * fx - dx * fz + loads.joint_torque[i, 1]
+    loads.gathered[parent, 26] += dx * fy - dy * fx + loads.joint_torque[i, 2]
+
+
+@inlined_kernel
 def _sweep_to_leaves(tree, motion, loads):
     n = tree.mass.shape[0]
     for i in range(n):
         p = tree.parent[i]
-        if p >= 0:
+        if p >= 0 and not tree.yields[i]:
             dx, dy, dz = motion.lever[i, 0], motion.lever[i, 1], motion.lever[i, 2]
             ux = motion.angular_velocity[p, 0]
             uy = motion.angular_velocity[p, 1]

@@ -19,6 +19,7 @@ class Tree(NamedTuple):
         root, whose reference point is its centre of mass.
     mass : (n,) kg.
     inertia : (n, 3) kg m2, principal moments along the own axes, about the centre of mass.
+    yields : (n,) whether the inboard joint lets its two points part (root: False).
     """
 
     parent: NDArray[np.int64]
@@ -26,6 +27,7 @@ class Tree(NamedTuple):
     centre_from_joint: Array
     mass: Array
     inertia: Array
+    yields: NDArray[np.bool_]
 
 
 class Motion(NamedTuple):
@@ -38,7 +40,8 @@ class Motion(NamedTuple):
     angular_velocity : (n, 3) rad/s.
     rotation : (n, 3, 3) rotation matrices of ``orientation``.
     centre, velocity : (n, 3) centre of mass and its velocity.
-    joint, joint_velocity : (n, 3) joint point and its velocity.
+    joint, joint_velocity : (n, 3) joint point on the segment and its velocity; of a joint that
+        yields they are part of the state.
     lever, offset : (n, 3) parent's joint to own joint, own joint to own centre.
     """
 
@@ -63,6 +66,8 @@ class Loads(NamedTuple):
     force, torque : (n, 3) N, N m, external load about the centre of mass.
     joint_torque : (n, 3) N m, torque of the inboard joint on the segment (its parent feels the
         opposite); ignored for the root.
+    joint_force : (n, 3) N, force of an inboard joint that yields on the segment, at its joint
+        point (its parent feels the opposite, there); 0 for the root.
     joint_acceleration : (n, 3) m/s2, acceleration of the joint point (root: centre of mass).
     angular_acceleration : (n, 3) rad/s2.
     gathered : (n, 27) workspace: what the children add to M, K, G, p and s.
@@ -72,6 +77,7 @@ class Loads(NamedTuple):
     force: Array
     torque: Array
     joint_torque: Array
+    joint_force: Array
     joint_acceleration: Array
     angular_acceleration: Array
     gathered: Array
@@ -94,5 +100,5 @@ def empty_loads(n: int) -> Loads:
     """Return zero loads for ``n`` segments."""
     return Loads(
         np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)),
-        np.zeros((n, 27)), np.zeros((n, 3, 3)), np.zeros((n, 3)),
+        np.zeros((n, 3)), np.zeros((n, 27)), np.zeros((n, 3, 3)), np.zeros((n, 3)),
     )  # fmt: skip

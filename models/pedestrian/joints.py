@@ -1,13 +1,13 @@
 """Joint resistance of a pedestrian, scaled from the 7-year-old reference."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models import data
 from models.pedestrian.anthropometry import SEGMENTS, Body, region_of
-from models.pedestrian.scaling import scale_between
+from models.pedestrian.scaling import Scale, scale_between
 from models.rotation import axis_rotation, multiply
 
 Array = NDArray[np.float64]
@@ -31,6 +31,9 @@ class Joints(NamedTuple):
     damping : (n, 3) N m s/rad.
     friction : (n,) N m.
     onset : (n,) rad, over which the stops fade in.
+    yields : (n,) whether the joint's two points can part.
+    give_low, give_high : (n, 3) N/m, stiffness against their parting in either direction of the
+        parent's axes. give_damping : (n, 3) N s/m.
     """
 
     centre: Array
@@ -43,9 +46,20 @@ class Joints(NamedTuple):
     damping: Array
     friction: Array
     onset: Array
+    yields: NDArray[np.bool_]
+    give_low: Array
+    give_high: Array
+    give_damping: Array
 
 
-def build_joints(body: Body, *, neck_stiffness: float = 1.0, muscle_tone: float = 1.0) -> Joints:
+def build_joints(
+    body: Body,
+    *,
+    neck_stiffness: float = 1.0,
+    muscle_tone: float = 1.0,
+    neck_tension_stiffness: float = 1.0,
+    shoulder_stiffness: float = 1.0,
+) -> Joints:
     """Return the resistance of the 14 joints of a body.
 
     Parameters
@@ -55,6 +69,10 @@ def build_joints(body: Body, *, neck_stiffness: float = 1.0, muscle_tone: float 
         Factor on passive stiffness, stops and damping of the two neck joints.
     muscle_tone : float
         Factor on joint friction; 1 is the setting in which a joint just holds its limb.
+    neck_tension_stiffness : float
+        Factor on the stiffness of the neck against being stretched.
+    shoulder_stiffness : float
+        Factor on the stiffness of the shoulder girdle, its damping following by the square root.
     """
     table = data.load("pedestrians/joints.toml")
     reference = data.load("pedestrians/segments.toml")["child_7y"]
@@ -71,6 +89,10 @@ def build_joints(body: Body, *, neck_stiffness: float = 1.0, muscle_tone: float 
         damping=np.zeros((n, 3)),
         friction=np.zeros(n),
         onset=np.full(n, np.radians(table["stop_onset"])),
+        yields=np.zeros(n, dtype=np.bool_),
+        give_low=np.zeros((n, 3)),
+        give_high=np.zeros((n, 3)),
+        give_damping=np.zeros((n, 3)),
     )
     for i, segment in enumerate(SEGMENTS):
         region = region_of(segment)
@@ -107,7 +129,31 @@ def build_joints(body: Body, *, neck_stiffness: float = 1.0, muscle_tone: float 
         # Friction holds the limb's weight: it follows mass times length, not tissue.
         weight = body.body_mass * body.stature / (reference["body_mass"] * reference["stature"])
         joints.friction[i] = row["friction"] * weight * muscle_tone
+        if "give" in row:
+            _let_yield(joints, i, row["give"], scale, mirrored=segment.endswith("_right"))
+    tension = SEGMENTS.index("head"), 2
+    joints.give_high[tension] *= neck_tension_stiffness
+    for i in (SEGMENTS.index("upper_arm_left"), SEGMENTS.index("upper_arm_right")):
+        joints.give_low[i] *= shoulder_stiffness
+        joints.give_high[i] *= shoulder_stiffness
+        joints.give_damping[i] *= np.sqrt(shoulder_stiffness)
     return joints
+
+
+def _let_yield(
+    joints: Joints, i: int, row: dict[str, Any], scale: Scale, *, mirrored: bool
+) -> None:
+    """Let the points of a joint part against the springs and dampers of its table."""
+    joints.yields[i] = True
+    for k, axis in enumerate("xyz"):
+        low, high = row["stiffness"][axis]
+        if mirrored and axis == "y":
+            low, high = high, low
+        joints.give_low[i, k], joints.give_high[i, k] = (
+            low * scale.stiffness,
+            high * scale.stiffness,
+        )
+    joints.give_damping[i] = np.array(row["damping"]) * scale.damping
 
 
 def elastic_energy(joints: Joints, joint: int, vector: Array) -> Array:

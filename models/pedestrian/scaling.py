@@ -44,6 +44,11 @@ class Scale:
         return self.modulus * self.length
 
     @property
+    def damping(self) -> float:
+        """Ratio of linear damping."""
+        return math.sqrt(self.modulus) * self.length**2
+
+    @property
     def moment(self) -> float:
         """Ratio of moments and of rotational stiffnesses."""
         return self.modulus * self.length**3

@@ -13,11 +13,10 @@ import pytest
 from models.compilation import kernel
 from models.crash.record import S_STEPS
 from models.criteria import head_injury_criterion
-from models.multibody.integration import correct, predict
+from models.multibody.integration import correct, empty_memory, predict
 from models.multibody.kinematics import update_kinematics
 from models.multibody.model import MultibodyModel
 from models.multibody.setup import build_crash, build_tree
-from models.multibody.simulation import empty_scratch
 from models.multibody.sweeps import solve_accelerations
 from models.multibody.tree import Tree, empty_loads, empty_motion
 from models.pedestrian.anthropometry import build_body
@@ -70,18 +69,12 @@ def mujoco_twin(tree: Tree) -> tuple[Any, Any]:
 
 
 @kernel
-def free_steps(tree, motion, loads, scratch, h, n):
+def free_steps(tree, motion, loads, memory, h, n):
     for _ in range(n):
-        predict(
-            motion, loads, scratch.old_spin, scratch.old_velocity, scratch.old_alpha,
-            scratch.old_acceleration, h,
-        )  # fmt: skip
+        predict(tree, motion, loads, memory, h)
         update_kinematics(tree, motion)
         solve_accelerations(tree, motion, loads)
-        correct(
-            motion, loads, scratch.old_spin, scratch.old_velocity, scratch.old_alpha,
-            scratch.old_acceleration, h,
-        )  # fmt: skip
+        correct(tree, motion, loads, memory, h)
 
 
 @pytest.fixture
@@ -92,7 +85,7 @@ def spin() -> np.ndarray:
 def test_our_free_tree(benchmark: Callable[..., Any], spin: np.ndarray) -> None:
     tree, motion, loads = child_tree(), empty_motion(15), empty_loads(15)
     motion.angular_velocity[:] = spin
-    benchmark(free_steps, tree, motion, loads, empty_scratch(15), 1e-4, STEPS)
+    benchmark(free_steps, tree, motion, loads, empty_memory(15), 1e-4, STEPS)
     medians["ours"] = median_of(benchmark)
     assert np.isfinite(motion.centre).all()
 

@@ -62,13 +62,13 @@ def lump(body: Body, region: str, mass: float) -> Body:
 
 
 def loose(joints: Joints) -> Joints:
-    """Return joints without resistance."""
+    """Return joints without resistance whose points stay together."""
     zero = {
         name: np.zeros_like(getattr(joints, name))
         for name in ("stiffness_low", "stiffness_high", "stop_low", "stop_high", "damping",
                      "friction")
     }  # fmt: skip
-    return joints._replace(**zero)
+    return joints._replace(**zero, yields=np.zeros_like(joints.yields))
 
 
 def impulse(impact: BluntImpact) -> Array:

@@ -41,6 +41,7 @@ def single_body() -> Tree:
         np.zeros((1, 3)),
         np.array([3.0]),
         np.array([[0.010, 0.013, 0.020]]),
+        np.zeros(1, dtype=np.bool_),
     )
 
 

@@ -5,9 +5,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from models.compilation import kernel
-from models.multibody.integration import correct, predict
+from models.multibody.bushings import apply_bushings
+from models.multibody.integration import correct, empty_memory, predict
 from models.multibody.joints import apply_joint_torques
-from models.multibody.kinematics import update_kinematics
+from models.multibody.kinematics import seat_joints, update_kinematics
 from models.multibody.sweeps import solve_accelerations
 from models.multibody.tree import Loads, Motion, Tree, empty_loads, empty_motion
 from models.pedestrian.joints import Joints
@@ -16,31 +17,31 @@ Array = NDArray[np.float64]
 
 
 @kernel
-def _advance(tree, motion, loads, spin, velocity, alpha, acceleration, h, count):
+def _advance(tree, motion, loads, memory, h, count):
     update_kinematics(tree, motion)
     solve_accelerations(tree, motion, loads)
     for _ in range(count):
-        predict(motion, loads, spin, velocity, alpha, acceleration, h)
+        predict(tree, motion, loads, memory, h)
         update_kinematics(tree, motion)
         solve_accelerations(tree, motion, loads)
-        correct(motion, loads, spin, velocity, alpha, acceleration, h)
+        correct(tree, motion, loads, memory, h)
     update_kinematics(tree, motion)
 
 
 @kernel
-def _advance_jointed(
-    tree, joints, motion, loads, spin, velocity, alpha, acceleration, power, h, count
-):
+def _advance_jointed(tree, joints, motion, loads, memory, power, h, count):
     update_kinematics(tree, motion)
     apply_joint_torques(tree, joints, motion, loads, power)
+    apply_bushings(tree, joints, motion, loads, power)
     solve_accelerations(tree, motion, loads)
     power[:] = 0.0
     for _ in range(count):
-        predict(motion, loads, spin, velocity, alpha, acceleration, h)
+        predict(tree, motion, loads, memory, h)
         update_kinematics(tree, motion)
         apply_joint_torques(tree, joints, motion, loads, power)
+        apply_bushings(tree, joints, motion, loads, power)
         solve_accelerations(tree, motion, loads)
-        correct(motion, loads, spin, velocity, alpha, acceleration, h)
+        correct(tree, motion, loads, memory, h)
     update_kinematics(tree, motion)
 
 
@@ -49,10 +50,6 @@ def _torques(tree, joints, motion, loads, power):
     update_kinematics(tree, motion)
     power[:] = 0.0
     apply_joint_torques(tree, joints, motion, loads, power)
-
-
-def scratch(n: int) -> tuple[Array, Array, Array, Array]:
-    return np.zeros((n, 3)), np.zeros(3), np.zeros((n, 3)), np.zeros(3)
 
 
 def gravity_loads(tree: Tree, gravity: float) -> Loads:
@@ -66,17 +63,22 @@ def advance(tree: Tree, motion: Motion, duration: float, step: float, gravity: f
     """Step free joints in place."""
     n = tree.mass.size
     count = round(duration / step)
-    _advance(tree, motion, gravity_loads(tree, gravity), *scratch(n), step, count)
+    _advance(tree, motion, gravity_loads(tree, gravity), empty_memory(n), step, count)
 
 
 def advance_jointed(
-    tree: Tree, joints: Joints, motion: Motion, duration: float, step: float
+    tree: Tree,
+    joints: Joints,
+    motion: Motion,
+    duration: float,
+    step: float,
+    gravity: float = 0.0,
 ) -> Array:
     """Step joints with resistance in place; return elastic and damping work (J) on the tree."""
     power = np.zeros(2)
-    loads = empty_loads(tree.mass.size)
+    loads = gravity_loads(tree, gravity)
     count = round(duration / step)
-    _advance_jointed(tree, joints, motion, loads, *scratch(tree.mass.size), power, step, count)
+    _advance_jointed(tree, joints, motion, loads, empty_memory(tree.mass.size), power, step, count)
     return step * power
 
 
@@ -100,7 +102,7 @@ def random_motion(tree: Tree, seed: int, spin: float) -> Motion:
     motion.angular_velocity[:] = rng.normal(0.0, spin, (n, 3))
     motion.root_position[:] = rng.normal(0.0, 1.0, 3)
     motion.root_velocity[:] = rng.normal(0.0, 1.0, 3)
-    update_kinematics(tree, motion)
+    seat_joints(tree, motion)
     return motion
 
 

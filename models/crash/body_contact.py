@@ -3,6 +3,7 @@
 import math
 
 from models.compilation import inlined_kernel
+from models.contact.dent import pressure_share
 from models.contact.friction import friction_coefficient
 from models.contact.geometry import ellipsoid_direction
 from models.crash.surfaces import (
@@ -34,9 +35,11 @@ def apply_road_contacts(zones, ellipsoids, road_surface, motion, loads, contacts
             continue
         if penetration > contacts.largest[i, road]:
             contacts.largest[i, road] = penetration
-        px = contacts.centre[i, 0] - contacts.shape[i, 2] / h
-        py = contacts.centre[i, 1] - contacts.shape[i, 4] / h
-        pz = contacts.centre[i, 2] - h
+        # The flesh is flattened on the road.
+        left = 1.0 - pressure_share(penetration, 0.0, h)
+        px = contacts.centre[i, 0] - left * contacts.shape[i, 2] / h
+        py = contacts.centre[i, 1] - left * contacts.shape[i, 4] / h
+        pz = contacts.centre[i, 2] - left * h
         vx, vy, vz = point_velocity(motion, i, px, py, pz)
         law = ellipsoids.surface_law[i, road]
         elastic, viscous = law_force(ellipsoids, law, penetration, -vz, contacts.largest[i, road])
@@ -57,6 +60,7 @@ def apply_road_contacts(zones, ellipsoids, road_surface, motion, loads, contacts
 def apply_self_contacts(ellipsoids, motion, loads, contacts, tree, power):
     """Add the loads between segments (head and arms against the trunk, leg against leg)."""
     for k in range(ellipsoids.pairs.shape[0]):
+        contacts.pair_force[k] = 0.0
         i, j = ellipsoids.pairs[k, 0], ellipsoids.pairs[k, 1]
         dx = contacts.centre[i, 0] - contacts.centre[j, 0]
         dy = contacts.centre[i, 1] - contacts.centre[j, 1]
@@ -99,6 +103,7 @@ def apply_self_contacts(ellipsoids, motion, loads, contacts, tree, power):
         law = ellipsoids.pairs[k, 2]
         elastic, viscous = law_force(ellipsoids, law, penetration, rate, contacts.pair_largest[k])
         normal = elastic + viscous
+        contacts.pair_force[k] = normal
         tx, ty, tz = vx + rate * nx, vy + rate * ny, vz + rate * nz
         slip = tx * tx + ty * ty + tz * tz
         mass = min(tree.mass[i], tree.mass[j])

@@ -7,13 +7,16 @@ contact's worth of force.
 import math
 
 from models.compilation import inlined_kernel
+from models.contact.dent import ploughing_coefficient, pressure_share
 from models.contact.friction import friction_coefficient
 from models.contact.geometry import roll_direction
 from models.crash.surfaces import (
     CAR_NORMAL,
     CONTACT_DAMPING,
     FRICTION,
+    PLOUGHING,
     law_force,
+    law_surface,
     point_velocity,
     push,
     shape_of,
@@ -123,6 +126,31 @@ def zone_separation(zones, ellipsoids, contacts, j, i, cx, cy, cz, cosine, sine)
 
 
 @inlined_kernel
+def _plough(
+    motion, loads, contacts, power, tree, car, i, mx, my, nz, resistance, support, dent
+):  # fmt: skip
+    """Add the force of a panel's dent against the slip of segment ``i``, at the ellipsoid's centre.
+
+    ``resistance`` (N) is the normal force times the panel's share, ``(mx, my, nz)`` the normal.
+    """
+    qx, qy, qz = contacts.centre[i, 0], contacts.centre[i, 1], contacts.centre[i, 2]
+    vx, vy, vz = point_velocity(motion, i, qx, qy, qz)
+    ux = vx - car[3] + car[5] * (qy - car[1])
+    uy = vy - car[4] - car[5] * (qx - car[0])
+    rate = ux * mx + uy * my + vz * nz
+    tx, ty, tz = ux - rate * mx, uy - rate * my, vz - rate * nz
+    slip = tx * tx + ty * ty + tz * tz
+    if slip == 0.0:
+        return
+    unit = 1.0 / math.sqrt(slip)
+    A = shape_of(contacts, i)
+    mu = ploughing_coefficient(A, support, dent, unit * tx, unit * ty, unit * tz)
+    c = friction_coefficient(mu, resistance, slip, tree.mass[i])
+    push(motion, loads, i, qx, qy, qz, -c * tx, -c * ty, -c * tz)
+    power[PLOUGHING] -= c * (tx * vx + ty * vy + tz * vz)
+
+
+@inlined_kernel
 def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, power):
     """Add the loads of the car on all segments.
 
@@ -138,10 +166,15 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
         reach = ellipsoids.reach[i]
         for j in range(count):
             contacts.segment_force[i, j] = 0.0
+        # Less what acted before, and what acts when all zones are done.
+        for k in range(3):
+            contacts.car_force[i, k] = -loads.force[i, k]
         if cx > reach or ellipsoids.surface_law[i, 0] < 0:
             # Ahead of the foremost point, x = 0, or free of the car.
             for j in range(count):
                 contacts.engaged[i, j] = False
+            for k in range(3):
+                contacts.car_force[i, k] = 0.0
             continue
         for j in range(count):
             engaged = contacts.engaged[i, j]
@@ -170,15 +203,19 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
             contacts.engaged[i, j] = True
             if penetration > contacts.largest[i, j]:
                 contacts.largest[i, j] = penetration
-            # World point, normal and relative velocity.
-            qx = car[0] + cosine * px - sine * py
-            qy = car[1] + sine * px + cosine * py
+            law = ellipsoids.surface_law[i, j]
+            dent = law_surface(ellipsoids, law, penetration)
+            support = nx * (cx - px) + ny * (cy - py) + nz * (cz - pz)
+            share = pressure_share(penetration - dent, dent, support)
+            # World point of the pressure's centre, normal and relative velocity there.
+            bx, by, bz = px + share * (cx - px), py + share * (cy - py), pz + share * (cz - pz)
+            qx = car[0] + cosine * bx - sine * by
+            qy = car[1] + sine * bx + cosine * by
             mx, my = cosine * nx - sine * ny, sine * nx + cosine * ny
-            vx, vy, vz = point_velocity(motion, i, qx, qy, pz)
+            vx, vy, vz = point_velocity(motion, i, qx, qy, bz)
             ux = vx - car[3] + car[5] * (qy - car[1])
             uy = vy - car[4] - car[5] * (qx - car[0])
             rate = -(ux * mx + uy * my + vz * nz)
-            law = ellipsoids.surface_law[i, j]
             elastic, viscous = law_force(ellipsoids, law, penetration, rate, contacts.largest[i, j])
             elastic *= weight
             viscous *= weight
@@ -190,13 +227,19 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
                 zones.friction[j], normal, tx * tx + ty * ty + tz * tz, tree.mass[i]
             )
             push(
-                motion, loads, i, qx, qy, pz,
+                motion, loads, i, qx, qy, bz,
                 normal * mx - c * tx, normal * my - c * ty, normal * nz - c * tz,
             )  # fmt: skip
             approach = vx * mx + vy * my + vz * nz
             power[CAR_NORMAL] += elastic * approach
             power[CONTACT_DAMPING] += viscous * approach
             power[FRICTION] -= c * (tx * vx + ty * vy + tz * vz)
+            if zones.ploughing[j] > 0.0:
+                resistance = zones.ploughing[j] * normal
+                _plough(
+                    motion, loads, contacts, power, tree, car, i, mx, my, nz,
+                    resistance, support, dent,
+                )  # fmt: skip
             contacts.zone_force[j] += normal
             contacts.segment_force[i, j] = normal
             contacts.point[i, j, 0] = px
@@ -205,3 +248,12 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
             contacts.normal[i, j, 0] = nx
             contacts.normal[i, j, 1] = ny
             contacts.normal[i, j, 2] = nz
+        for k in range(3):
+            contacts.car_force[i, k] += loads.force[i, k]
+
+
+@inlined_kernel
+def car_force_of(contacts, i):
+    """Return the resultant (N) of the car's forces on segment ``i``, friction included."""
+    x, y, z = contacts.car_force[i, 0], contacts.car_force[i, 1], contacts.car_force[i, 2]
+    return math.sqrt(x * x + y * y + z * z)

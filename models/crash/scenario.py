@@ -65,7 +65,9 @@ def build_scenario(
         if zone.name == HOOD:
             force = inputs["hood_force_scale"] * curves[k].force
             curves[k] = chain.act("curve", replace(curves[k], force=force), given)
-    tissue: Mapping[str, ForceCurve] = chain.act("tissue", build_tissue(body), given)
+    flesh = build_tissue(body)
+    flesh["head"] = flesh["head"].scaled(force=inputs["head_stiffness"])
+    tissue: Mapping[str, ForceCurve] = chain.act("tissue", flesh, given)
     road = chain.act("road", Road(inputs["friction_body_road"]), given)
     posture = running_posture(
         body,
@@ -78,10 +80,16 @@ def build_scenario(
         body=body,
         vehicle=vehicle,
         joints=build_joints(
-            body, neck_stiffness=inputs["neck_stiffness"], muscle_tone=inputs["muscle_tone"]
+            body,
+            neck_stiffness=inputs["neck_stiffness"],
+            muscle_tone=inputs["muscle_tone"],
+            neck_tension_stiffness=inputs["neck_tension_stiffness"],
+            shoulder_stiffness=inputs["shoulder_stiffness"],
         ),
         ellipsoids=build_ellipsoids(body, tissue, curves, road.returned),
-        zones=build_zones(vehicle, inputs["dive_angle"], inputs["friction_body_car"]),
+        zones=build_zones(
+            vehicle, inputs["dive_angle"], inputs["friction_body_car"], inputs["ploughing"]
+        ),
         road=road,
         car_motion=chain.act(
             "braking",

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from models.compilation import inlined_kernel
 from models.contact.geometry import shape_matrix
-from models.contact.law import DAMPING_ONSET, contact_force
+from models.contact.law import DAMPING_ONSET, SURFACE, contact_force, interpolate_law
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -21,8 +21,9 @@ Index = NDArray[np.int64]
     SELF_NORMAL,
     FRICTION,
     CONTACT_DAMPING,
-) = range(7)
-CHANNELS = 7
+    PLOUGHING,
+) = range(8)
+CHANNELS = 8
 WORK_CHANNELS = (
     "joint_elastic",
     "joint_damping",
@@ -31,6 +32,7 @@ WORK_CHANNELS = (
     "self_contact",
     "friction",
     "contact_damping",
+    "ploughing",
 )
 
 
@@ -40,11 +42,12 @@ class Contacts(NamedTuple):
     Attributes
     ----------
     largest : (n, z + 1) m, largest penetration so far. pair_largest : (p,) m.
-    pair_normal : (p, 3) last separating direction of a pair.
+    pair_normal : (p, 3) last separating direction of a pair. pair_force : (p,) N, its normal force.
     engaged : (n, z) whether a segment entered a zone through its surface and is still in it.
     zone_force : (z + 1,) N, sum over segments of the normal force at this instant.
     segment_force : (n, z + 1) N, normal force at this instant.
-    point : (n, z, 3) m, contact point in the car's frame at this instant.
+    car_force : (n, 3) N, all of the car's force on a segment at this instant, world axes.
+    point : (n, z, 3) m, deepest point in the car's frame at this instant.
     normal : (n, z, 3) car-frame normal at this instant (of the nearest approach).
     centre : (n, 3) m, ellipsoid centres, world.
     shape : (n, 6) m2, shape matrices, world: xx, xy, xz, yy, yz, zz.
@@ -53,9 +56,11 @@ class Contacts(NamedTuple):
     largest: Array
     pair_largest: Array
     pair_normal: Array
+    pair_force: Array
     engaged: NDArray[np.bool_]
     zone_force: Array
     segment_force: Array
+    car_force: Array
     point: Array
     normal: Array
     centre: Array
@@ -68,9 +73,11 @@ def empty_contacts(n: int, z: int, p: int) -> Contacts:
         largest=np.zeros((n, z + 1)),
         pair_largest=np.zeros(p),
         pair_normal=np.zeros((p, 3)),
+        pair_force=np.zeros(p),
         engaged=np.zeros((n, z), dtype=np.bool_),
         zone_force=np.zeros(z + 1),
         segment_force=np.zeros((n, z + 1)),
+        car_force=np.zeros((n, 3)),
         point=np.zeros((n, z, 3)),
         normal=np.zeros((n, z, 3)),
         centre=np.zeros((n, 3)),
@@ -153,3 +160,9 @@ def law_force(ellipsoids, law, penetration, rate, largest):
         rate,
         largest,
     )
+
+
+@inlined_kernel
+def law_surface(ellipsoids, law, penetration):
+    """Return the surface's share (m) of a penetration (m) under combined law ``law``."""
+    return interpolate_law(ellipsoids.laws, law, ellipsoids.counts[law], SURFACE, penetration)

@@ -3,6 +3,7 @@
 import math
 
 from models.compilation import inlined_kernel
+from models.crash.car_contact import car_force_of
 from models.crash.record import (
     R_ACCELERATION,
     R_CENTRE,
@@ -13,8 +14,76 @@ from models.crash.record import (
     R_SPIN_RATE,
     R_TIME,
     R_ZONES,
+    S_GROUND_TIME,
+    S_HEAD_DEPTH,
+    S_HEAD_ZONE,
 )
 from models.multibody.kinematics import centre_acceleration
+
+BLOW_GAP = 0.01
+"""s without force after which the head's next contact with an arm is another blow (assumed)."""
+BLOW_FORCE = 300.0
+"""N that an arm must have put on the head to count as the head's first blow (assumed)."""
+
+# Entries of the head's last blow on an arm.
+B_START, B_VELOCITY, B_LAST, B_PEAK = 0, 1, 4, 5
+BLOW = 6
+
+
+@inlined_kernel
+def _relative_velocity(head, motion, car):
+    """Return the velocity of the head's centre of mass relative to the car-fixed point where it is.
+
+    In car axes, m/s.
+    """
+    ux = motion.velocity[head, 0] - car[3] + car[5] * (motion.centre[head, 1] - car[1])
+    uy = motion.velocity[head, 1] - car[4] - car[5] * (motion.centre[head, 0] - car[0])
+    cosine, sine = math.cos(car[2]), math.sin(car[2])
+    return cosine * ux + sine * uy, -sine * ux + cosine * uy, motion.velocity[head, 2]
+
+
+@inlined_kernel
+def note_blow(time, head, ellipsoids, motion, contacts, car, blow):
+    """Note when and how fast the head ran into an arm; one blow lasts until a gap of force."""
+    force = 0.0
+    for k in range(ellipsoids.pairs.shape[0]):
+        if ellipsoids.pairs[k, 0] == head or ellipsoids.pairs[k, 1] == head:
+            force += contacts.pair_force[k]
+    if force <= 0.0:
+        return
+    if time - blow[B_LAST] > BLOW_GAP:
+        blow[B_START], blow[B_PEAK] = time, 0.0
+        ux, uy, uz = _relative_velocity(head, motion, car)
+        blow[B_VELOCITY], blow[B_VELOCITY + 1], blow[B_VELOCITY + 2] = ux, uy, uz
+    blow[B_LAST] = time
+    blow[B_PEAK] = max(blow[B_PEAK], force)
+
+
+@inlined_kernel
+def note_head(time, head, motion, contacts, car, blow, head_contact, summary):
+    """Note the head's first contact with the car and its deepest place in it.
+
+    Its speed is that of the first blow: where the head lies on an arm that lies on the car, the
+    arm has braked it before.
+    """
+    deepest = summary[S_HEAD_DEPTH]
+    for j in range(contacts.zone_force.shape[0] - 1):
+        if contacts.segment_force[head, j] <= 0.0:
+            continue
+        if not math.isfinite(head_contact[0]):
+            head_contact[0] = time
+            ux, uy, uz = _relative_velocity(head, motion, car)
+            if time - blow[B_LAST] <= BLOW_GAP and blow[B_PEAK] >= BLOW_FORCE:
+                ux, uy, uz = blow[B_VELOCITY], blow[B_VELOCITY + 1], blow[B_VELOCITY + 2]
+            head_contact[1], head_contact[2], head_contact[3] = ux, uy, uz
+            for k in range(3):
+                head_contact[4 + k] = contacts.normal[head, j, k]
+        if contacts.largest[head, j] > deepest and summary[S_GROUND_TIME] == math.inf:
+            deepest = contacts.largest[head, j]
+            summary[S_HEAD_ZONE] = float(j)
+            for k in range(3):
+                head_contact[7 + k] = contacts.point[head, j, k]
+    summary[S_HEAD_DEPTH] = deepest
 
 
 @inlined_kernel
@@ -32,20 +101,15 @@ def write_record(row, time, head, tree, road_surface, motion, loads, contacts, c
             q += motion.rotation[head, j, k] * loads.angular_acceleration[head, j]
         record[row, R_SPIN + k] = w
         record[row, R_SPIN_RATE + k] = q
-    # Velocity of the head's centre of gravity relative to the car-fixed point where it is.
-    ux = motion.velocity[head, 0] - car[3] + car[5] * (motion.centre[head, 1] - car[1])
-    uy = motion.velocity[head, 1] - car[4] - car[5] * (motion.centre[head, 0] - car[0])
-    cosine, sine = math.cos(car[2]), math.sin(car[2])
-    record[row, R_RELATIVE] = cosine * ux + sine * uy
-    record[row, R_RELATIVE + 1] = -sine * ux + cosine * uy
-    record[row, R_RELATIVE + 2] = motion.velocity[head, 2]
+    ux, uy, uz = _relative_velocity(head, motion, car)
+    record[row, R_RELATIVE] = ux
+    record[row, R_RELATIVE + 1] = uy
+    record[row, R_RELATIVE + 2] = uz
     zones = contacts.zone_force.shape[0] - 1
-    force = 0.0
     for j in range(zones):
-        force += contacts.segment_force[head, j]
         record[row, R_ZONES + j] = contacts.zone_force[j]
     record[row, R_ZONES + zones] = contacts.zone_force[zones]
-    record[row, R_HEAD_CAR] = force
+    record[row, R_HEAD_CAR] = car_force_of(contacts, head)
     record[row, R_HEAD_ROAD] = contacts.segment_force[head, zones]
     total = 0.0
     for k in range(3):

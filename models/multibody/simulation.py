@@ -21,7 +21,6 @@ from models.crash.record import (
     S_ENERGY_START,
     S_FRAMES,
     S_GROUND_TIME,
-    S_HEAD_DEPTH,
     S_HEAD_ZONE,
     S_REASON,
     S_RECORDS,
@@ -36,7 +35,7 @@ from models.multibody.bushings import apply_bushings
 from models.multibody.integration import Memory, correct, empty_memory, predict
 from models.multibody.joints import apply_joint_torques
 from models.multibody.kinematics import update_kinematics
-from models.multibody.recording import write_frame, write_record
+from models.multibody.recording import B_LAST, BLOW, note_blow, note_head, write_frame, write_record
 from models.multibody.sweeps import solve_accelerations
 from models.vehicle.motion import car_state
 
@@ -50,11 +49,14 @@ class Scratch(NamedTuple):
     power: Array
     old_power: Array
     memory: Memory
+    blow: Array
 
 
 def empty_scratch(n: int) -> Scratch:
     """Return the workspace for ``n`` segments."""
-    return Scratch(np.zeros(6), np.zeros(CHANNELS), np.zeros(CHANNELS), empty_memory(n))
+    return Scratch(
+        np.zeros(6), np.zeros(CHANNELS), np.zeros(CHANNELS), empty_memory(n), np.zeros(BLOW)
+    )
 
 
 class Settings(NamedTuple):
@@ -181,8 +183,9 @@ def simulate(
         State and workspace, changed in place.
     work : (CHANNELS,) J, filled: work on the body by channel.
     record : (rows, 18 + z + 1), frames : (rows, 4 + 7 n), filled.
-    head_contact : (10,), filled at the head's first contact with the car: time, velocity relative
-        to the car (3), normal (3); at its deepest: contact point (3), all in the car's frame.
+    head_contact : (10,) NaN, filled at the head's first contact with the car: time, velocity
+        relative to the car at its first blow (3), normal (3); at its deepest: contact point (3),
+        all in the car's frame.
     summary : (SUMMARY,), filled.
     """
     car, power, old_power = scratch.car, scratch.power, scratch.old_power
@@ -196,7 +199,7 @@ def simulate(
     summary[S_GROUND_TIME] = math.inf
     summary[S_HEAD_ZONE] = -1.0
     rows, shots, steps, ticks = 0, 0, 0, 0
-    touched = False
+    scratch.blow[B_LAST] = -math.inf
     quiet = 0.0
     reason = TIME_LIMIT
     while True:
@@ -224,28 +227,8 @@ def simulate(
         correct(tree, motion, loads, memory, h)
         for k in range(CHANNELS):
             work[k] += 0.5 * h * (old_power[k] + power[k])
-        # The head on the car.
-        deepest = summary[S_HEAD_DEPTH]
-        for j in range(road):
-            if contacts.segment_force[head, j] <= 0.0:
-                continue
-            if not touched:
-                touched = True
-                ux = motion.velocity[head, 0] - car[3] + car[5] * (motion.centre[head, 1] - car[1])
-                uy = motion.velocity[head, 1] - car[4] - car[5] * (motion.centre[head, 0] - car[0])
-                cosine, sine = math.cos(car[2]), math.sin(car[2])
-                head_contact[0] = time
-                head_contact[1] = cosine * ux + sine * uy
-                head_contact[2] = -sine * ux + cosine * uy
-                head_contact[3] = motion.velocity[head, 2]
-                for k in range(3):
-                    head_contact[4 + k] = contacts.normal[head, j, k]
-            if contacts.largest[head, j] > deepest and summary[S_GROUND_TIME] == math.inf:
-                deepest = contacts.largest[head, j]
-                summary[S_HEAD_ZONE] = float(j)
-                for k in range(3):
-                    head_contact[7 + k] = contacts.point[head, j, k]
-        summary[S_HEAD_DEPTH] = deepest
+        note_blow(time, head, ellipsoids, motion, contacts, car, scratch.blow)
+        note_head(time, head, motion, contacts, car, scratch.blow, head_contact, summary)
         # First landing of trunk or head.
         if summary[S_GROUND_TIME] == math.inf:
             for i in range(settings.trunk + 1):

@@ -3,6 +3,7 @@
 import math
 
 from models.compilation import inlined_kernel
+from models.crash.car_contact import car_force_of
 from models.crash.record import (
     R_ACCELERATION,
     R_CENTRE,
@@ -62,11 +63,9 @@ def write_record(row, time, body, road, settings, state, contacts, car, memory, 
         record[row, R_SPIN + k] = -state[head, SPIN] * body.normal[head, k]
     record[row, R_RELATIVE] = state[head, SPEED_X] - car[3]
     record[row, R_RELATIVE + 2] = state[head, SPEED_Z]
-    force = 0.0
     for j in range(zones):
-        force += contacts.segment_force[head, j]
         record[row, R_ZONES + j] = contacts.zone_force[j]
-    record[row, R_HEAD_CAR] = force
+    record[row, R_HEAD_CAR] = car_force_of(contacts, head)
     # Pymunk's impulses on the road are no forces.
     record[row, R_HEAD_ROAD] = math.nan
     record[row, R_ZONES + zones] = math.nan

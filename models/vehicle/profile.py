@@ -34,6 +34,7 @@ class Zone:
     inner: float
     half_width: float
     curvature: float
+    ploughing: float
     corridor: Corridor
 
 
@@ -123,6 +124,7 @@ def _read_zone(row: dict[str, object]) -> Zone:
         inner=float(numbers("inner")) if "inner" in row else 0.0,
         half_width=float(numbers("half_width")),
         curvature=float(numbers("curvature")),
+        ploughing=float(numbers("ploughing")) if "ploughing" in row else 0.0,
         corridor=read_corridor(row),
     )
 
@@ -146,13 +148,16 @@ def _dive_shift(vehicle: Vehicle, dive_angle: float) -> Array:
     return np.array([-front, float(shift[1])])
 
 
-def build_zones(vehicle: Vehicle, dive_angle: float, friction_body_car: float) -> Zones:
+def build_zones(
+    vehicle: Vehicle, dive_angle: float, friction_body_car: float, ploughing: float = 1.0
+) -> Zones:
     """Return the compiled form of the front of a diving car.
 
     Parameters
     ----------
     vehicle : Vehicle
     dive_angle : rad, nose down. friction_body_car : 1.
+    ploughing : factor on the ploughing of all panels.
     """
     zones = vehicle.zones
     shift = _dive_shift(vehicle, dive_angle)
@@ -182,6 +187,7 @@ def build_zones(vehicle: Vehicle, dive_angle: float, friction_body_car: float) -
         joined=vehicle.joined,
         box=box,
         friction=np.full(len(zones), friction_body_car),
+        ploughing=np.array([ploughing * z.ploughing for z in zones]),
     )
 
 

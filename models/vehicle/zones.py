@@ -37,7 +37,8 @@ class Zones(NamedTuple):
     joined : (z, z) whether two zones share a border: what slides from one to the other stays in
         contact.
     box : (z, 4) m, lowest and highest x, lowest and highest z that a contact point can have.
-    friction : (z,) against the body.
+    friction : (z,) against the body. ploughing : (z,) share of the resistance of a lasting dent
+        against the slip of the body in it.
     """
 
     kind: Index
@@ -53,3 +54,4 @@ class Zones(NamedTuple):
     joined: NDArray[np.bool_]
     box: Array
     friction: Array
+    ploughing: Array

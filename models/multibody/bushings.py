@@ -3,10 +3,24 @@
 The child's joint point is free; a force holds it at its place on the parent. The stretch is taken
 in the parent's axes, with a stiffness of its own on either side of zero (tension and compression
 of a neck), and force and reaction act at the same point, the child's, so that neither momentum is
-lost: these are three slide joints with springs before the spherical one.
+lost: these are three slide joints with springs before the spherical one. Beyond its range a spring
+is stiffer: what in a body would tear still holds.
 """
 
+import math
+
 from models.compilation import inlined_kernel
+
+BEYOND = 5.0
+"""Stiffness beyond the range over that within it (assumed)."""
+
+
+@inlined_kernel
+def _spring(joints, i, k, stretch):
+    """Return the force (N) that pulls a stretch (m) back."""
+    stiffness = joints.give_high[i, k] if stretch > 0.0 else joints.give_low[i, k]
+    beyond = max(abs(stretch) - joints.give_range[i], 0.0)
+    return stiffness * (stretch + math.copysign((BEYOND - 1.0) * beyond, stretch))
 
 
 @inlined_kernel
@@ -36,8 +50,7 @@ def apply_bushings(tree, joints, motion, loads, power):
             )
             stretch = ex * dx + ey * dy + ez * dz - tree.joint_in_parent[i, k]
             rate = ex * vx + ey * vy + ez * vz
-            stiffness = joints.give_high[i, k] if stretch > 0.0 else joints.give_low[i, k]
-            elastic = stiffness * stretch
+            elastic = _spring(joints, i, k, stretch)
             viscous = joints.give_damping[i, k] * rate
             power[0] -= elastic * rate
             power[1] -= viscous * rate

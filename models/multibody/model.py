@@ -13,12 +13,12 @@ from models.declaration import read_inputs, read_outputs
 from models.effects.registry import effects_of
 from models.multibody.setup import Crash, build_crash
 from models.multibody.simulation import Settings, empty_scratch, simulate
-from models.multibody.stability import STABLE, joint_rate, stable_ticks
+from models.multibody.stability import STABLE, joint_rate, stable_ticks, surface_mobility
 from models.multibody.tree import empty_loads
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
 
-COARSE, FLIGHT = 3, 6
-"""Ticks a step in quiet contact and in free flight."""
+COARSE, SLIDE, FLIGHT = 3, 6, 6
+"""Ticks a step in quiet contact with the car, on the road alone, and in free flight."""
 
 _TABLE = data.load("multibody.toml")
 
@@ -48,7 +48,7 @@ class MultibodyModel(CrashModel):
         """
         n, zones = len(SEGMENTS), len(self.vehicle.zones)
         scenario = crash.scenario
-        rate = joint_rate(crash.tree, scenario.joints)
+        rate = joint_rate(crash.tree, scenario.joints, crash.motion)
         # A light body with stiff joints takes a finer step than asked for.
         tick = self.tick / max(1, math.ceil(rate * self.tick / STABLE))
         record = self._record
@@ -57,12 +57,14 @@ class MultibodyModel(CrashModel):
         settings = Settings(
             tick=tick,
             coarse=stable_ticks(rate, tick, COARSE),
+            slide=stable_ticks(rate, tick, SLIDE),
             flight=stable_ticks(rate, tick, FLIGHT),
             time_limit=TIME_LIMIT,
             step_limit=record.shape[0] - 1,
             frame_every=round(FRAME_INTERVAL / tick),
             head=HEAD,
             trunk=max(TRUNK),
+            mobility=surface_mobility(crash.tree, scenario.body.semi_axes),
         )
         work, head_contact, summary = np.zeros(CHANNELS), np.full(10, np.nan), np.zeros(SUMMARY)
         simulate(

@@ -36,6 +36,7 @@ from models.multibody.integration import Memory, correct, empty_memory, predict
 from models.multibody.joints import apply_joint_torques
 from models.multibody.kinematics import update_kinematics
 from models.multibody.recording import B_LAST, BLOW, note_blow, note_head, write_frame, write_record
+from models.multibody.stability import ticks_in_contact
 from models.multibody.sweeps import solve_accelerations
 from models.vehicle.motion import car_state
 
@@ -64,20 +65,24 @@ class Settings(NamedTuple):
 
     Attributes
     ----------
-    tick : s, the finest step. coarse, flight : ticks a step in quiet contact and in free flight.
+    tick : s, the finest step. coarse, slide, flight : ticks that a step may take in quiet contact
+        with the car, on the road alone, and in free flight.
     time_limit : s of crash. step_limit : steps.
     frame_every : ticks between frames.
     head : row of the head. trunk : highest row that counts as trunk.
+    mobility : (n,) 1/kg, as ``models.multibody.stability.surface_mobility`` gives it.
     """
 
     tick: float
     coarse: int
+    slide: int
     flight: int
     time_limit: float
     step_limit: int
     frame_every: int
     head: int
     trunk: int
+    mobility: Array
 
 
 @inlined_kernel
@@ -142,14 +147,15 @@ def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts):
     gap = contacts.centre[head, 2] - math.sqrt(contacts.shape[head, 5])
     if fall > HEAD_FALL and gap < ahead * fall + 1e-3:
         return 1
-    for j in range(road + 1):
-        if contacts.zone_force[j] > 0.0:
-            return settings.coarse
+    wanted = settings.flight
     for i in range(motion.centre.shape[0]):
         gap = contacts.centre[i, 2] - ellipsoids.reach[i]
         if gap < -ahead * motion.velocity[i, 2] + 1e-3:
-            return settings.coarse
-    return settings.flight
+            wanted = settings.slide
+    for j in range(road):
+        if contacts.zone_force[j] > 0.0:
+            wanted = settings.coarse
+    return ticks_in_contact(settings, ellipsoids, contacts, wanted)
 
 
 @inlined_kernel

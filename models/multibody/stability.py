@@ -5,21 +5,36 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from models.compilation import inlined_kernel, kernel
+from models.contact.law import FORCE, RECOVERY, interpolate_law
+from models.multibody.bushings import BEYOND
 from models.multibody.joints import FRICTION_RATE
-from models.multibody.tree import Tree
+from models.multibody.sweeps import solve_accelerations
+from models.multibody.tree import Motion, Tree, empty_loads
 from models.pedestrian.joints import TWIST_FRICTION, Joints
 
 Array = NDArray[np.float64]
 
-STABLE = 0.5
-"""Largest joint rate times step. The integrator's damping is stable below 1, an undamped spring
-below 2 in its circular frequency (L. Verlet 1967), of which half counts as its rate; half of both
-keeps a spring that is damped as well away from the bound."""
+STABLE = 0.8
+"""Largest damping rate times step; the integrator is stable below 1. Friction counts at its
+steepest, at rest, so a body in motion is further away from the bound."""
+RESOLVED = 1.0
+"""Largest circular frequency of a spring times step; stable below 2 without damping (L. Verlet
+1967)."""
+SWEEPS = 30
+"""Power iterations for the largest damping rate; it is then known to some per cent."""
 
 
-def joint_rate(tree: Tree, joints: Joints) -> float:
-    """Return the largest rate (1/s) of the joints: of their damping and of their bushings."""
-    return max(_damping_rate(tree, joints), _bushing_rate(tree, joints))
+def joint_rate(tree: Tree, joints: Joints, motion: Motion) -> float:
+    """Return the largest rate (1/s) of the joints: ``STABLE`` over it is the longest step.
+
+    Of their damping and of their bushings, a bushing's frequency counting as ``STABLE / RESOLVED``.
+
+    Parameters
+    ----------
+    tree, joints : of a body. motion : a posture of it, its kinematics up to date.
+    """
+    return max(_damping_rate(tree, joints, motion), _bushing_rate(tree, joints))
 
 
 def stable_ticks(rate: float, tick: float, wanted: int) -> int:
@@ -27,34 +42,104 @@ def stable_ticks(rate: float, tick: float, wanted: int) -> int:
     return min(wanted, max(1, int(STABLE / (rate * tick))))
 
 
-def _damping_rate(tree: Tree, joints: Joints) -> float:
-    """Return the largest rotational damping rate (1/s) of a segment.
+def surface_mobility(tree: Tree, semi_axes: Array) -> Array:
+    """Return the acceleration (n,) 1/kg of each segment's surface per unit force on it.
 
-    A segment's rate is the damping of its joints over its inertia, to which its children's masses
-    add about the transverse axes.
+    Of the free segment, at half of its longest semi-axis from its centre of mass (assumed: bodies
+    lie on the road along their length).
+    """
+    longest = np.argmax(semi_axes, axis=1)
+    arms = np.zeros_like(semi_axes)
+    rows = np.arange(semi_axes.shape[0])
+    arms[rows, longest] = 0.5 * semi_axes[rows, longest]
+    return np.array([_mobility(tree, i, arm) for i, arm in enumerate(arms)])
+
+
+@inlined_kernel
+def ticks_in_contact(settings, ellipsoids, contacts, wanted):
+    """Return how many ticks, one to ``wanted``, a step may take with what is in contact now.
+
+    The stiffness of a contact is that of its unloading, its mass what the free segments put there.
+    """
+    fastest = 0.0
+    for i in range(contacts.centre.shape[0]):
+        for j in range(contacts.zone_force.shape[0]):
+            if contacts.segment_force[i, j] > 0.0:
+                law, deepest = ellipsoids.surface_law[i, j], contacts.largest[i, j]
+                stiffness = _unloading(ellipsoids, law, deepest)
+                fastest = max(fastest, settings.mobility[i] * stiffness)
+    for k in range(ellipsoids.pairs.shape[0]):
+        if contacts.pair_force[k] > 0.0:
+            mobility = (
+                settings.mobility[ellipsoids.pairs[k, 0]]
+                + settings.mobility[ellipsoids.pairs[k, 1]]
+            )
+            stiffness = _unloading(ellipsoids, ellipsoids.pairs[k, 2], contacts.pair_largest[k])
+            fastest = max(fastest, mobility * stiffness)
+    if fastest == 0.0:
+        return wanted
+    longest = RESOLVED / (math.sqrt(fastest) * settings.tick)
+    return max(1, int(min(longest, float(wanted))))
+
+
+@inlined_kernel
+def _unloading(ellipsoids, law, deepest):
+    """Return the unloading slope (N/m) of a combined law from its deepest penetration (m)."""
+    count = ellipsoids.counts[law]
+    top = interpolate_law(ellipsoids.laws, law, count, FORCE, deepest)
+    return top / interpolate_law(ellipsoids.laws, law, count, RECOVERY, deepest)
+
+
+def _damping_rate(tree: Tree, joints: Joints, motion: Motion) -> float:
+    """Return the largest rotational damping rate (1/s) of the body as a whole.
+
+    Of relative accelerations of all joints under the torques of all dampers: the largest eigenvalue
+    of damping times mobility, friction counted at its steepest, by power iteration.
     """
     n = tree.mass.size
-    damping = joints.damping + joints.friction[:, None] / FRICTION_RATE * [
-        1.0,
-        1.0,
-        TWIST_FRICTION,
-    ]
-    total = damping.copy()
-    inertia = tree.inertia.copy()
-    lever = np.linalg.norm(tree.centre_from_joint, axis=1)
-    inertia[:, :2] += (tree.mass * lever**2)[:, None]
+    mobility = np.zeros((3 * n, 3 * n))
+    still = Motion(*(array.copy() for array in motion))
+    still.angular_velocity[:] = 0.0
+    _fill_mobility(tree, still, empty_loads(n), mobility)
+    friction = joints.friction[:, None] / FRICTION_RATE * [1.0, 1.0, TWIST_FRICTION]
+    root = np.sqrt(joints.damping + friction).ravel()
+    root[:3] = 0.0
+    matrix = root[:, None] * mobility * root
+    vector = root / max(float(np.linalg.norm(root)), 1e-300)
+    rate = 0.0
+    for _ in range(SWEEPS):
+        turned = matrix @ vector
+        rate = float(np.linalg.norm(turned))
+        if rate == 0.0:
+            break
+        vector = turned / rate
+    return rate
+
+
+@kernel
+def _fill_mobility(tree, motion, loads, mobility):
+    """Fill the relative angular acceleration of every joint per unit torque in every joint."""
+    n = tree.mass.shape[0]
     for i in range(1, n):
-        parent = tree.parent[i]
-        total[parent] += damping[i]
-        if not tree.yields[i]:
-            inertia[parent, :2] += tree.mass[i] * float(
-                tree.joint_in_parent[i] @ tree.joint_in_parent[i]
-            )
-    return float((total / inertia)[1:].max())
+        for k in range(3):
+            for j in range(3):
+                loads.joint_torque[i, j] = motion.rotation[i, j, k]
+            solve_accelerations(tree, motion, loads)
+            for m in range(1, n):
+                p = tree.parent[m]
+                for axis in range(3):
+                    turn = 0.0
+                    for j in range(3):
+                        turn += motion.rotation[m, j, axis] * (
+                            loads.angular_acceleration[m, j] - loads.angular_acceleration[p, j]
+                        )
+                    mobility[3 * m + axis, 3 * i + k] = turn
+            for j in range(3):
+                loads.joint_torque[i, j] = 0.0
 
 
 def _bushing_rate(tree: Tree, joints: Joints) -> float:
-    """Return the largest rate (1/s) of a joint that yields: of its damping, half of its frequency.
+    """Return the largest rate (1/s) of a joint that yields, by its damping and its frequency.
 
     By the mass that two segments, free of all others, put against each other at the joint point.
     """
@@ -67,7 +152,7 @@ def _bushing_rate(tree: Tree, joints: Joints) -> float:
         stiffness = max(joints.give_low[i].max(), joints.give_high[i].max())
         rates += [
             float(joints.give_damping[i].max() * mobility),
-            0.5 * math.sqrt(stiffness * mobility),
+            STABLE / RESOLVED * math.sqrt(BEYOND * stiffness * mobility),
         ]
     return max(rates)
 

@@ -33,7 +33,8 @@ class Joints(NamedTuple):
     onset : (n,) rad, over which the stops fade in.
     yields : (n,) whether the joint's two points can part.
     give_low, give_high : (n, 3) N/m, stiffness against their parting in either direction of the
-        parent's axes. give_damping : (n, 3) N s/m.
+        parent's axes. give_damping : (n, 3) N s/m. give_range : (n,) m, either way, beyond which
+        the points hardly part further.
     """
 
     centre: Array
@@ -50,6 +51,7 @@ class Joints(NamedTuple):
     give_low: Array
     give_high: Array
     give_damping: Array
+    give_range: Array
 
 
 def build_joints(
@@ -93,6 +95,7 @@ def build_joints(
         give_low=np.zeros((n, 3)),
         give_high=np.zeros((n, 3)),
         give_damping=np.zeros((n, 3)),
+        give_range=np.full(n, np.inf),
     )
     for i, segment in enumerate(SEGMENTS):
         region = region_of(segment)
@@ -154,6 +157,7 @@ def _let_yield(
             high * scale.stiffness,
         )
     joints.give_damping[i] = np.array(row["damping"]) * scale.damping
+    joints.give_range[i] = row["range"] * scale.length
 
 
 def elastic_energy(joints: Joints, joint: int, vector: Array) -> Array:

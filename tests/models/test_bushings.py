@@ -39,6 +39,7 @@ def free_joints(n: int) -> Joints:
         neutral=zero, stiffness_low=zero, stiffness_high=zero, stop_low=zero, stop_high=zero,
         damping=zero, friction=np.zeros(n), onset=np.ones(n), yields=np.zeros(n, dtype=np.bool_),
         give_low=zero.copy(), give_high=zero.copy(), give_damping=zero.copy(),
+        give_range=np.full(n, np.inf),
     )  # fmt: skip
 
 
@@ -49,6 +50,7 @@ def let_yield(joints: Joints, stiffness: Array, damping: float) -> Joints:
     for name in YIELDING:
         i = SEGMENTS.index(name)
         give[i], rate[i], yields[i] = stiffness, damping, True
+    joints = joints._replace(give_range=np.full(joints.yields.size, np.inf))
     return joints._replace(yields=yields, give_low=give, give_high=give.copy(), give_damping=rate)
 
 
@@ -114,6 +116,24 @@ def test_tension_and_compression_have_their_own_stiffness() -> None:
     quarter = 0.5 * math.pi * math.sqrt(1.0 / high)
     advance_jointed(tree, joints, motion, quarter + 0.5 * math.pi * math.sqrt(1.0 / low), 1e-6)
     assert motion.joint[1, 0] - motion.joint[0, 0] == pytest.approx(-0.01 / 3.0, rel=1e-4)
+
+
+def test_beyond_its_range_a_joint_is_five_times_as_stiff() -> None:
+    # Released beyond the range, the pair passes the middle with all of its energy in motion.
+    stiffness, masses, reach, start = 40e3, (2.0, 2.0), 0.01, 0.015
+    tree, joints = pair(masses, 0.0, stiffness, stiffness)
+    joints.give_range[1] = reach
+    motion = empty_motion(2)
+    seat_joints(tree, motion)
+    motion.joint[1, 0] += start
+    # The force is k q up to the range and then k r + 5 k (q - r).
+    over = start - reach
+    energy = 0.5 * stiffness * reach**2 + stiffness * reach * over + 2.5 * stiffness * over**2
+    fastest = 0.0
+    for _ in range(200):
+        advance_jointed(tree, joints, motion, 1e-4, 1e-6)
+        fastest = max(fastest, abs(motion.joint_velocity[1, 0] - motion.joint_velocity[0, 0]))
+    assert fastest == pytest.approx(math.sqrt(2.0 * energy), rel=1e-3)
 
 
 def mujoco_model(tree: Tree, joints: Joints, step: float) -> tuple[mujoco.MjModel, list[int]]:
@@ -244,8 +264,8 @@ def test_a_stiffer_joint_tends_to_the_exact_one() -> None:
 def test_the_longest_step_allowed_is_stable(stiffness: float, damping: float, seed: int) -> None:
     joints = let_yield(free_joints(len(SEGMENTS)), np.full(3, stiffness), damping)
     tree = child(joints)
-    step = STABLE / joint_rate(tree, joints)
     motion = random_motion(tree, seed, spin=0.0)
+    step = STABLE / joint_rate(tree, joints, motion)
     motion.root_velocity[:] = 0.0
     seat_joints(tree, motion)
     start = 1e-4

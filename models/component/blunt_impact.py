@@ -1,7 +1,8 @@
-"""A flat rigid impactor against one region of the free, upright body, from the front.
+"""A flat rigid impactor against one region of the free, upright body, from any side.
 
-Thorax and abdomen impacts of child donors (Ouyang 2006, 2015) and of dummies (49 CFR 572.124).
-Weight is left out: the impact is over before the body has begun to fall.
+Thorax and abdomen impacts of child donors (Ouyang 2006, 2015) and of dummies (49 CFR 572.124),
+lateral and oblique hub impacts of adults (Viano 1989), frontal ones (Lebarbe 2012). Weight is left
+out: the impact is over before the body has begun to fall. Arms are out of the impactor's way.
 """
 
 import math
@@ -11,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.compilation import kernel
+from models.contact.dent import pressure_share
 from models.contact.law import KNOTS, contact_force, law_of
 from models.crash.ellipsoids import build_ellipsoids
-from models.crash.surfaces import empty_contacts, push, update_surfaces
+from models.crash.surfaces import empty_contacts, push, shape_of, update_surfaces
 from models.multibody.bushings import apply_bushings
 from models.multibody.integration import correct, empty_memory, predict
 from models.multibody.joints import apply_joint_torques
@@ -58,9 +60,12 @@ class BluntImpact:
 @kernel
 def _strike(
     tree, joints, ellipsoids, motion, loads, contacts, memory, power,
-    laws, count, segment, mass, speed, step, out,
+    laws, count, segment, mass, speed, nx, ny, step, out,
 ):  # fmt: skip
-    """Step until the record ``out`` (n, 2) of force and deflection is full."""
+    """Step until the record ``out`` (n, 2) of force and deflection is full.
+
+    The impactor comes from the horizontal direction ``(nx, ny)``.
+    """
     face, rate, force, deepest = 0.0, speed, 0.0, 0.0
     for k in range(out.shape[0]):
         old_force = force
@@ -73,19 +78,25 @@ def _strike(
             for j in range(3):
                 loads.force[i, j] = 0.0
                 loads.torque[i, j] = 0.0
-        reach = math.sqrt(contacts.shape[segment, 0])
-        front = contacts.centre[segment, 0] + reach
+        xx, xy, xz, yy, yz, _ = shape_of(contacts, segment)
+        ax, ay, az = xx * nx + xy * ny, xy * nx + yy * ny, xz * nx + yz * ny
+        reach = math.sqrt(ax * nx + ay * ny)
+        cx, cy, cz = (
+            contacts.centre[segment, 0],
+            contacts.centre[segment, 1],
+            contacts.centre[segment, 2],
+        )
+        front = cx * nx + cy * ny + reach
         if k == 0:
             face = front
-        depth = front - face
+        depth = max(front - face, 0.0)
         deepest = max(deepest, depth)
-        elastic, viscous = contact_force(laws, 0, count, 0.0, 0.0, max(depth, 0.0), 0.0, deepest)
+        elastic, viscous = contact_force(laws, 0, count, 0.0, 0.0, depth, 0.0, deepest)
         force = elastic + viscous
+        left = (1.0 - pressure_share(depth, 0.0, reach)) / reach
         push(
-            motion, loads, segment, front,
-            contacts.centre[segment, 1] + contacts.shape[segment, 1] / reach,
-            contacts.centre[segment, 2] + contacts.shape[segment, 2] / reach,
-            -force, 0.0, 0.0,
+            motion, loads, segment, cx + left * ax, cy + left * ay, cz + left * az,
+            -force * nx, -force * ny, 0.0,
         )  # fmt: skip
         apply_joint_torques(tree, joints, motion, loads, power)
         apply_bushings(tree, joints, motion, loads, power)
@@ -94,19 +105,25 @@ def _strike(
             correct(tree, motion, loads, memory, step)
             rate -= 0.5 * step * (old_force + force) / mass
         out[k, 0] = force
-        out[k, 1] = max(depth, 0.0)
+        out[k, 1] = depth
 
 
 def strike_region(
-    body: Body, joints: Joints, region: str, impactor_mass: float, speed: float
+    body: Body,
+    joints: Joints,
+    region: str,
+    impactor_mass: float,
+    speed: float,
+    side: float = 0.0,
 ) -> BluntImpact:
-    """Strike a region of the upright body from the front.
+    """Strike a region of the upright body.
 
     Parameters
     ----------
     body, joints : Body, Joints
     region : a segment of the trunk or the head, e.g. ``chest``.
     impactor_mass, speed : kg, m/s.
+    side : rad, where the impactor comes from: 0 from the front, pi / 2 from the left.
     """
     n, segment = len(SEGMENTS), SEGMENTS.index(region)
     laws = np.zeros((1, KNOTS, 4))
@@ -118,7 +135,8 @@ def strike_region(
     _strike(
         tree, joints, ellipsoids, motion, empty_loads(n),
         empty_contacts(n, 0, len(ellipsoids.pairs)), empty_memory(n), np.zeros(2), laws, count,
-        segment, impactor_mass, speed, STEP, out,
+        segment, impactor_mass, speed,
+        math.cos(side), math.sin(side), STEP, out,
     )  # fmt: skip
     over = np.flatnonzero((out[:, 0] == 0.0) & (np.arange(len(out)) > np.argmax(out[:, 0])))
     end = int(over[0]) + 1 if over.size else len(out)

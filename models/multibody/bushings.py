@@ -16,7 +16,7 @@ BEYOND = 5.0
 
 
 @inlined_kernel
-def _spring(joints, i, k, stretch):
+def spring_force(joints, i, k, stretch):
     """Return the force (N) that pulls a stretch (m) back."""
     stiffness = joints.give_high[i, k] if stretch > 0.0 else joints.give_low[i, k]
     beyond = max(abs(stretch) - joints.give_range[i], 0.0)
@@ -50,7 +50,7 @@ def apply_bushings(tree, joints, motion, loads, power):
             )
             stretch = ex * dx + ey * dy + ez * dz - tree.joint_in_parent[i, k]
             rate = ex * vx + ey * vy + ez * vz
-            elastic = _spring(joints, i, k, stretch)
+            elastic = spring_force(joints, i, k, stretch)
             viscous = joints.give_damping[i, k] * rate
             power[0] -= elastic * rate
             power[1] -= viscous * rate

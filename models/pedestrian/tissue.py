@@ -7,7 +7,7 @@ import numpy as np
 from models import data
 from models.contact.law import ForceCurve
 from models.pedestrian.anthropometry import SEGMENTS, Body
-from models.pedestrian.scaling import scale_between
+from models.pedestrian.scaling import Scale, scale_between
 
 
 @functools.cache
@@ -23,10 +23,13 @@ def build_tissue(body: Body) -> dict[str, ForceCurve]:
     """Return the force-penetration curve of every body region."""
     reference = data.load("pedestrians/segments.toml")["child_7y"]
     scale = scale_between(body.stature, body.age, reference["stature"], reference["age"])
-    return {
-        region: curve.scaled(force=scale.force, penetration=scale.length)
-        for region, curve in _reference_curves().items()
-    }
+    even = Scale(scale.length)
+    rows = data.load("pedestrians/tissue.toml")["regions"]
+    scaled = {}
+    for region, curve in _reference_curves().items():
+        by = even if rows[region].get("same_modulus", False) else scale
+        scaled[region] = curve.scaled(force=by.force, penetration=by.length)
+    return scaled
 
 
 @functools.cache

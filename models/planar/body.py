@@ -34,6 +34,9 @@ class PlanarBody(NamedTuple):
     side : (n,) m, y of the ellipsoid's centre. orientation : (n, 4) quaternions at the start.
     centre : (n, 2) m. velocity : (n, 2) m/s. spin : (n,) rad/s.
     joint : (n, 2) m, joint to the parent (root: its centre).
+    axes : (n, 3, 2) the segment's own axes at the start, their parts in the plane.
+    mobility : (n,) 1/kg, largest acceleration of the joint's two points against each other per unit
+        force between them, both segments free.
     """
 
     parent: Index
@@ -49,6 +52,8 @@ class PlanarBody(NamedTuple):
     velocity: Array
     spin: Array
     joint: Array
+    axes: Array
+    mobility: Array
 
 
 def hold_in_plane(body: Body, posture: Posture) -> PlanarBody:
@@ -72,10 +77,17 @@ def hold_in_plane(body: Body, posture: Posture) -> PlanarBody:
         joint[i] = centre[parent, ::2] + arm[::2]
         at_joint = velocity[parent] + spin[parent] * _quarter_turn(arm[::2])
         velocity[i] = at_joint + spin[i] * _quarter_turn(centre[i, ::2] - joint[i])
+    inertia = (normal**2 * body.inertia).sum(axis=1)
+    mobility = np.zeros(n)
+    for i, parent in enumerate(PARENTS):
+        if parent >= 0:
+            for k in (i, parent):
+                arm = joint[i] - centre[k, ::2]
+                mobility[i] += 1.0 / body.mass[k] + float(arm @ arm) / inertia[k]
     return PlanarBody(
         parent=np.array(PARENTS, dtype=np.int64),
         mass=body.mass.copy(),
-        inertia=(normal**2 * body.inertia).sum(axis=1),
+        inertia=inertia,
         normal=normal,
         shadow=np.stack([shape[:, 0, 0], shape[:, 0, 2], shape[:, 2, 2]], axis=1),
         offset=offset[:, ::2].copy(),
@@ -86,6 +98,8 @@ def hold_in_plane(body: Body, posture: Posture) -> PlanarBody:
         velocity=velocity,
         spin=spin.copy(),
         joint=joint,
+        axes=rotation[:, ::2, :].transpose(0, 2, 1).copy(),
+        mobility=mobility,
     )
 
 

@@ -34,11 +34,17 @@ class PlanarJoints(NamedTuple):
     ----------
     torque : (n, CELLS + 1) N m on the child, over its turn from the start against its parent, from
         -pi to pi. damping : (n,) N m s/rad. friction : (n,) N m.
+    yields, give_low, give_high, give_damping, give_range : as of the spatial joints.
     """
 
     torque: Array
     damping: Array
     friction: Array
+    yields: NDArray[np.bool_]
+    give_low: Array
+    give_high: Array
+    give_damping: Array
+    give_range: Array
 
 
 def joints_in_plane(joints: Joints, body: PlanarBody) -> PlanarJoints:
@@ -54,6 +60,11 @@ def joints_in_plane(joints: Joints, body: PlanarBody) -> PlanarJoints:
         torque=_torque_table(joints, body),
         damping=(square * joints.damping).sum(axis=1),
         friction=joints.friction * (square @ weight),
+        yields=joints.yields,
+        give_low=joints.give_low,
+        give_high=joints.give_high,
+        give_damping=joints.give_damping,
+        give_range=joints.give_range,
     )
 
 

@@ -77,7 +77,7 @@ class PlanarModel(CrashModel):
         memory[M_ROAD_TIME] = np.inf
         summary[S_GROUND_TIME], summary[S_HEAD_ZONE] = np.inf, -1.0
         simulate(
-            STEP_SPACE, EACH_BODY, space.link, body, joints.torque, ellipsoids, scenario.zones,
+            STEP_SPACE, EACH_BODY, space.link, body, joints, ellipsoids, scenario.zones,
             scenario.road, car_motion, settings, space.state, space.given, motion, empty_loads(n),
             contacts, np.zeros(6), np.zeros(CHANNELS), memory,
             self._record, self._frames, head_contact, summary,

@@ -106,8 +106,8 @@ class PlanarSpace:
         space.add(car)
         for i, parent in enumerate(body.parent):
             if parent >= 0:
-                joint = (float(body.joint[i, 0]), float(body.joint[i, 1]))
-                space.add(*_joint(segments[parent], segments[i], joint, joints, i))
+                held = None if joints.yields[i] else body.joint[i]
+                space.add(*_joint(segments[parent], segments[i], held, joints, i))
         for i, segment in enumerate(segments):
             shape = pymunk.Poly(segment, outline(body, i, CORNERS))
             shape.friction = 1.0
@@ -145,17 +145,25 @@ def _segment(body: PlanarBody, i: int) -> pymunk.Body:
 def _joint(
     parent: pymunk.Body,
     child: pymunk.Body,
-    place: tuple[float, float],
+    place: Array | None,
     joints: PlanarJoints,
     row: int,
 ) -> list[pymunk.Constraint]:
-    """Return pivot, damper and friction of a joint; its springs and stops come from outside."""
-    pivot = pymunk.PivotJoint(parent, child, place)
-    pivot.error_bias = math.exp(-1.0 / JOINT_RELAXATION)
+    """Return pivot, damper and friction of a joint; its springs and stops come from outside.
+
+    A joint that yields has no place and no pivot.
+    """
     damper = pymunk.DampedRotarySpring(parent, child, 0.0, 0.0, float(joints.damping[row]))
-    brake = pymunk.SimpleMotor(parent, child, 0.0)
-    brake.max_force = float(joints.friction[row])
-    return [pivot, damper, brake] if joints.friction[row] > 0.0 else [pivot, damper]
+    held: list[pymunk.Constraint] = [damper]
+    if place is not None:
+        pivot = pymunk.PivotJoint(parent, child, (float(place[0]), float(place[1])))
+        pivot.error_bias = math.exp(-1.0 / JOINT_RELAXATION)
+        held.insert(0, pivot)
+    if joints.friction[row] > 0.0:
+        brake = pymunk.SimpleMotor(parent, child, 0.0)
+        brake.max_force = float(joints.friction[row])
+        held.append(brake)
+    return held
 
 
 def _restitution(ellipsoids: Ellipsoids, segment: int) -> float:

@@ -26,6 +26,7 @@ from models.crash.record import (
     TIME_LIMIT,
 )
 from models.crash.stepping import HEAD_NEAR, head_meets_car
+from models.planar.bushings import add_bushings
 from models.planar.recording import (
     M_LENGTH,
     M_QUIET,
@@ -196,7 +197,7 @@ def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts, land
 
 @inlined_kernel
 def _apply_loads(
-    body, table, ellipsoids, zones, state, ahead, given, motion, loads, contacts, car, power
+    body, joints, ellipsoids, zones, state, ahead, given, motion, loads, contacts, car, power
 ):  # fmt: skip
     """Write the loads of a step of ``ahead`` s, and every body's own velocity.
 
@@ -217,7 +218,8 @@ def _apply_loads(
         given[i, FORCE_X], given[i, FORCE_Z] = loads.force[i, 0], loads.force[i, 2]
         given[i, TORQUE] = -loads.torque[i, 1]
         given[i, GIVEN_X], given[i, GIVEN_Z] = state[i, SPEED_X], state[i, SPEED_Z]
-    _add_joint_torques(body, table, state, ahead, given)
+    _add_joint_torques(body, joints.torque, state, ahead, given)
+    add_bushings(body, joints, state, ahead, given)
 
 
 @inlined_kernel
@@ -243,7 +245,7 @@ def _end_reason(settings, body, state, contacts, memory, time):
 
 @kernel
 def simulate(
-    step_space, each_body, link, body, table, ellipsoids, zones, road, car_motion, settings,
+    step_space, each_body, link, body, joints, ellipsoids, zones, road, car_motion, settings,
     state, given, motion, loads, contacts, car, power, memory,
     record, frames, head_contact, summary,
 ):  # fmt: skip
@@ -252,7 +254,7 @@ def simulate(
     Parameters
     ----------
     step_space, each_body : as in ``models.planar.chipmunk``. link : of the space.
-    body, table, ellipsoids, zones, road, car_motion, settings : constant data.
+    body, joints, ellipsoids, zones, road, car_motion, settings : constant data.
     state, given : of the space, changed in place.
     motion, loads, contacts, car, power, memory : workspace; car as in ``models.vehicle.motion``.
     record, frames, head_contact, summary : as in ``models.multibody.simulation``; road forces are
@@ -262,7 +264,7 @@ def simulate(
     reason = -1
     car_state(car_motion, 0.0, car)
     _apply_loads(
-        body, table, ellipsoids, zones, state, 0.0, given, motion, loads, contacts, car, power
+        body, joints, ellipsoids, zones, state, 0.0, given, motion, loads, contacts, car, power
     )
     while True:
         time = memory[M_TICKS] * settings.tick
@@ -290,7 +292,7 @@ def simulate(
         # The mean speed brings the car exactly to where it is at the step's end.
         car_state(car_motion, memory[M_TICKS] * settings.tick, car)
         _apply_loads(
-            body, table, ellipsoids, zones, state, length, given,
+            body, joints, ellipsoids, zones, state, length, given,
             motion, loads, contacts, car, power,
         )  # fmt: skip
         given[link.car, GIVEN_X] = (car[0] - state[link.car, X]) / length

@@ -49,6 +49,7 @@ def validate(workers: int) -> Part:
         # A horizontal blow meets the hood at the hood's own slope.
         table["angle"] = np.degrees(table["head_impact_angle"] - hood_slope())
         table["wad_ratio"] = table["wad"] / table["stature"]
+        table["mass_ratio"] = table["effective_head_mass"] / table["head_mass"]
         table["time_ms"] = 1e3 * table["head_impact_time"]
     at_forty = by_speed[np.isclose(by_speed["impact_speed"], 40.0 / 3.6)]
     nominal = load_model("multibody").run({})
@@ -67,6 +68,12 @@ def validate(workers: int) -> Part:
             "effective_mass_ratio",
             nominal.outputs["effective_head_mass"] / nominal.inputs["head_mass"],
         ),
+        check("effective_mass_case", nominal.outputs["effective_head_mass"]),
+        check("effective_mass_postures", at_forty["mass_ratio"].median()),
+        check("angular_velocity_case", nominal.outputs["head_angular_velocity"]),
+        check("angular_acceleration_case", nominal.outputs["head_angular_acceleration"]),
+        check("clip_case", nominal.outputs["clip_3ms"]),
+        check("hood_case", 1e-3 * _hood_slope()),
         check("pelvis_speed", _pelvis_speed()),
         check("low_speed_hic", worst["hic15"]),
         check("low_speed_3ms", worst["clip_3ms"]),
@@ -90,6 +97,13 @@ def hood_slope() -> float:
     dive = load_model("multibody").inputs
     angle = next(item.nominal for item in dive if item.name == "dive_angle")
     return float(np.arctan2(direction[1], -direction[0])) - angle
+
+
+def _hood_slope() -> float:
+    """Return the slope (N/m) of the nominal hood's loading curve."""
+    car = load_vehicle("family_car_1990s")
+    curve = car.zones[car.zone_index("hood")].corridor.curve(0.5)
+    return float(curve.force[1] / curve.penetration[1])
 
 
 def _pelvis_speed() -> float:

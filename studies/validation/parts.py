@@ -8,11 +8,13 @@ from models.registry import load_model
 from studies.validation import (
     body_parts,
     dummy_head,
+    ground_impact,
     head_impact,
     headform_impacts,
     numerics,
     standing_child,
     throw_distance,
+    trunk_impacts,
 )
 from studies.validation.check import Part
 
@@ -24,13 +26,17 @@ PARTS: dict[str, Callable[[int], Part]] = {
     "standing-child": standing_child.validate,
     "numerics": numerics.validate,
 }
-DUMMY = "dummy-head"
-"""The part that reads measured data."""
+MEASURED: dict[str, Callable[[int, Path], Part]] = {
+    "trunk": trunk_impacts.validate,
+    "ground": ground_impact.validate,
+    "dummy-head": dummy_head.validate,
+}
+"""The parts that read measured data."""
 
 
 def part_names() -> tuple[str, ...]:
     """Return the names of all parts."""
-    return (*PARTS, DUMMY)
+    return (*PARTS, *MEASURED)
 
 
 def run_parts(
@@ -47,8 +53,8 @@ def run_parts(
     load_model("multibody").run({})
     parts = []
     for name in follow(names, "parts of the validation", quiet=quiet):
-        if name == DUMMY:
-            parts.append(dummy_head.validate(workers, measured))
+        if name in MEASURED:
+            parts.append(MEASURED[name](workers, measured))
         else:
             parts.append(PARTS[name](workers))
     return parts

@@ -121,8 +121,9 @@ def _report(parts: Sequence[Part]) -> str:
     labels = (
         "Labels: found was read in its source; recalled and estimated were not, and judge "
         "accordingly; assumed is our own choice; measured stands on data at hand; exact is a "
-        "closed form, a conservation law or a requirement of the numerics. Nothing was tuned to a "
-        "reference of this table but the abdomen, whose law is the donors'."
+        "closed form, a conservation law or a requirement of the numerics. Tuned to references of "
+        "this table were the curves of chest, abdomen and hip (the hub tests and the donors'), and "
+        "the nominal case to the five numbers of the paper that the README names; nothing else."
     )
     sections = [
         Section(
@@ -130,7 +131,7 @@ def _report(parts: Sequence[Part]) -> str:
             (summary, labels),
             [Table("What lies outside, and why.", ["what", "ours", "reference", "why"],
                    [[c.what, quantity(c.ours, c.unit), c.cited,
-                     c.reason or "not known"] for c in missed])],
+                     c.reason or "unexplained"] for c in missed])],
         )
     ]  # fmt: skip
     sections += [

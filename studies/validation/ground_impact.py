@@ -1,0 +1,97 @@
+"""The head's impact on the road, beside measured ones of falling child dummies.
+
+A robot ran into standing dummies, which fell and struck the ground with their heads (D.
+Paez-Granados and A. Billard, 2022; digitised, not part of the project). Equal set-ups differ
+up to 150-fold, so distributions are compared, not tests.
+"""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mcstudy.errors import UserError
+from mcstudy.figures import style
+from mcstudy.figures.panels import Curve, Panel, draw_panels
+from mcstudy.text import number
+from models.protocol import complete_status
+from models.registry import load_model
+from studies.validation.check import Part, check
+from studies.validation.sweep import sweep
+from studies.validation.walkers import CENTRAL, SIDES
+
+Array = NDArray[np.float64]
+
+FILE = "dummy_ground_impact_summary.csv"
+Q3 = {"age": 3.0, "stature": 0.95, "body_mass": 14.5, "head_mass": 2.8, "running_speed": 0.0}
+"""A standing three-year-old, as heavy as the dummy [recalled]."""
+SPEEDS = (1.0, 1.5, 3.1)
+"""m/s of the robot."""
+PHASES = tuple(np.arange(12) / 12.0)
+
+
+def validate(workers: int, measured: Path) -> Part:
+    """Return the part on the impact on the road.
+
+    Raises
+    ------
+    UserError
+        If the file is there but cannot be read.
+    """
+    path = measured / FILE
+    if not path.exists():
+        missing = f"Not run: {FILE} is not in the folder of measured data (option --measured)."
+        keys = ("ground_hic_median", "ground_hic_range")
+        return Part("Impact on the road", (missing,), [check(key, math.nan) for key in keys])
+    try:
+        table = pd.read_csv(path)
+        measured_hic = np.sort(table["hic15"].to_numpy(dtype=float))
+        child = table.loc[table["dummy"] == "Q3", "hic15"].to_numpy(dtype=float)
+    except (OSError, ValueError, KeyError) as error:
+        raise UserError(f"{path}: cannot be read ({error})") from None
+    cases = [
+        {**CENTRAL, **Q3, "impact_speed": v, "facing_angle": side, "gait_phase": float(phase)}
+        for v in SPEEDS
+        for phase in PHASES
+        for side in SIDES
+    ]
+    runs = sweep(cases, workers=workers)
+    complete = runs["status"].isin(complete_status(load_model("multibody")))
+    ours = runs.loc[complete, "ground_hic15"].to_numpy()
+    ours = np.sort(ours[ours > 0.0])
+    inside = np.mean((ours >= measured_hic[0]) & (ours <= measured_hic[-1]))
+    low, high = (float(q) for q in np.quantile(ours, [0.05, 0.95]))
+    checks = [
+        check("ground_hic_median", float(np.median(ours) / np.median(child))),
+        check("ground_hic_range", 100.0 * float(inside)),
+    ]
+    words = (
+        f"HIC15 of the head on the road: {len(measured_hic)} records of falling dummies from "
+        f"{number(measured_hic[0])} to {number(measured_hic[-1])}, median of the three-year-old "
+        f"dummy {number(float(np.median(child)))}; our {len(ours)} falls of a standing "
+        "three-year-old, pushed by a car front at the robot's speeds, have a median of "
+        f"{number(float(np.median(ours)))}, nine in ten {number(low)} to {number(high)}. The "
+        "pushes differ (a robot's bumper, a car), and a falling person's arms protect; neither was "
+        "made to fit."
+    )
+    panel = Panel(
+        "HIC15 on the road [–]",
+        "share of falls below [–]",
+        [
+            Curve(measured_hic, _ranks(measured_hic), "dummies", "black", "", "o"),
+            Curve(np.sort(child), _ranks(child), "three-year-old dummy", style.GREEN, "", "s"),
+            Curve(ours, _ranks(ours), "ours", style.BLUE),
+        ],
+        ylim=(0.0, 1.0),
+    )
+    figure = draw_panels([panel], columns=1, width=5.2, height=3.6)
+    figure.axes[0].set_xscale("log")
+    return Part(
+        "Impact on the road", (words,), checks, {"Distribution of HIC15 on the road.": figure}
+    )
+
+
+def _ranks(values: Array) -> Array:
+    return (np.arange(values.size) + 0.5) / values.size

@@ -1,0 +1,90 @@
+"""The state in which a body leaves the car, and Searle's bounds from there.
+
+Searle's relation (J. Searle, SAE 831622, 1983; 930659, 1993 [recalled]) is about a body that leaves
+at a speed v under an angle, flies, lands and slides with friction mu to rest, s away and H lower::
+
+    v (cos a + mu sin a) = sqrt(2 mu g (s - mu H))
+
+so that v lies between ``sqrt(2 mu g (s - mu H) / (1 + mu^2))`` and ``sqrt(2 mu g (s - mu H))`` for
+any upward angle. It says nothing about the way on the car, nor that v is the car's speed.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+
+from models.criteria.units import STANDARD_GRAVITY
+from models.registry import load_model
+from models.vehicle.profile import load_vehicle
+from studies.validation.sweep import CHUNK
+
+Array = NDArray[np.float64]
+
+VEHICLE = "family_car_1990s"
+"""The car of the model's default."""
+TOUCH = 1.0
+"""N of the car's forces on the body above which they are in contact (assumed)."""
+
+
+def separations(cases: Sequence[Mapping[str, float]], *, workers: int = -1) -> pd.DataFrame:
+    """Return speed (m/s), height of fall (m), way to rest (m) and friction of runs from separation.
+
+    Runs that never leave the car, or are on the road before they do, are left out.
+
+    Parameters
+    ----------
+    cases : inputs that differ from nominal. workers : processes, -1 for one a core.
+    """
+    parts = [list(cases[k : k + CHUNK]) for k in range(0, len(cases), CHUNK)]
+    found = Parallel(n_jobs=workers)(delayed(_separate)(part) for part in parts)
+    rows = [row for part in found for row in part]
+    return pd.DataFrame(rows, columns=["speed", "fall", "way", "friction"])
+
+
+def _separate(cases: Sequence[Mapping[str, float]]) -> list[tuple[float, float, float, float]]:
+    model = load_model("multibody")
+    zones = [f"contact_force_{zone.name}" for zone in load_vehicle(VEHICLE).zones]
+    centre = [f"centre_of_gravity_{axis}" for axis in "xyz"]
+    rows = []
+    for case in cases:
+        run = model.observe(case, [*zones, "contact_force_road", *centre])
+        force = run.histories["contact_force"]
+        car = sum(force.channels[name.removeprefix("contact_force_")] for name in zones)
+        touched = np.flatnonzero(np.asarray(car) > TOUCH)
+        place = np.stack([run.histories["centre_of_gravity"].channels[axis] for axis in "xyz"])
+        landed = np.flatnonzero(force.channels["road"] > TOUCH)
+        if not touched.size or not run.end_reason.startswith("rest_on_road"):
+            continue
+        k = int(touched[-1]) + 1
+        first = landed[landed > touched[0]]
+        # Feet may touch the road from the start; what counts is the body's weight on it later.
+        if k + 1 >= place.shape[1] or (first.size and k > first[-1]):
+            continue
+        rate = (place[:, k + 1] - place[:, k]) * _rate(force.time)
+        way = float(np.hypot(*(place[:2, -1] - place[:2, k])))
+        rows.append(
+            (
+                float(np.linalg.norm(rate)),
+                float(place[2, k] - place[2, -1]),
+                way,
+                float(run.inputs["friction_body_road"]),
+            )
+        )
+    return rows
+
+
+def _rate(time: Array) -> float:
+    return 1.0 / float(time[1] - time[0])
+
+
+def share_within_searle(table: pd.DataFrame) -> float:
+    """Return the share of runs whose speed at separation lies within Searle's bounds."""
+    mu = table["friction"].to_numpy()
+    reach = np.maximum(table["way"].to_numpy() - mu * table["fall"].to_numpy(), 0.0)
+    highest = np.sqrt(2.0 * mu * STANDARD_GRAVITY * reach)
+    lowest = highest / np.sqrt(1.0 + mu**2)
+    speed = table["speed"].to_numpy()
+    return float(np.mean((lowest <= speed) & (speed <= highest)))

@@ -18,7 +18,7 @@ from models.multibody.kinematics import seat_joints, update_kinematics
 from models.multibody.sweeps import solve_accelerations
 from models.multibody.tree import Tree, empty_loads, empty_motion
 from models.pedestrian.anthropometry import SEGMENTS, Body
-from models.pedestrian.joints import Joints
+from models.pedestrian.joints import Joints, joints_of
 
 Array = NDArray[np.float64]
 
@@ -127,7 +127,7 @@ def swing_neck(
         inertia=np.vstack([np.full(3, HEAVY), body.inertia[rows]]),
         yields=joints.yields[chain],
     )
-    held = Joints(*(np.ascontiguousarray(array[chain]) for array in joints))
+    held = joints_of(joints, chain)
     n = len(chain)
     motion, loads = empty_motion(n), empty_loads(n)
     motion.orientation[:] = _FACING[direction]

@@ -6,7 +6,6 @@ It is the same for every crash model, so that models differ by their method alon
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from models.contact.law import ForceCurve
 from models.crash.ellipsoids import Ellipsoids, build_ellipsoids
 from models.crash.road import Road
 from models.effects.chain import EffectChain
@@ -65,9 +64,8 @@ def build_scenario(
         if zone.name == HOOD:
             force = inputs["hood_force_scale"] * curves[k].force
             curves[k] = chain.act("curve", replace(curves[k], force=force), given)
-    flesh = build_tissue(body)
-    flesh["head"] = flesh["head"].scaled(force=inputs["head_stiffness"])
-    tissue: Mapping[str, ForceCurve] = chain.act("tissue", flesh, given)
+    tissue = build_tissue(body)
+    tissue["head"] = tissue["head"].scaled(force=inputs["head_stiffness"])
     road = chain.act("road", Road(inputs["friction_body_road"]), given)
     posture = running_posture(
         body,

@@ -7,8 +7,8 @@ sampled like any other input. It acts at one stage of a run:
 - ``inputs``: on the values of the model's inputs, before anything is built;
 - ``curve``: on the loading curve of the hood that the head strikes;
 - ``contact``: on what the contact does beside its curve (rate, moving mass);
-- ``braking``, ``posture``, ``tissue``, ``road``: on the car's motion, the person's posture and
-  tissue, and the road of a crash;
+- ``braking``, ``posture``, ``road``: on the car's motion, the person's posture and the road of a
+  crash;
 - ``signal``: on what the accelerometer reads.
 """
 
@@ -24,7 +24,7 @@ from models.protocol import Input
 
 Array = NDArray[np.float64]
 
-STAGES = ("inputs", "curve", "contact", "braking", "posture", "tissue", "road", "signal")
+STAGES = ("inputs", "curve", "contact", "braking", "posture", "road", "signal")
 
 
 @dataclass(frozen=True)

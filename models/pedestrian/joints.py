@@ -160,6 +160,12 @@ def _let_yield(
     joints.give_range[i] = row["range"] * scale.length
 
 
+def joints_of(joints: Joints, rows: list[int]) -> Joints:
+    """Return the joints of some segments, in the order of ``rows``."""
+    chosen = {name: np.ascontiguousarray(array[rows]) for name, array in joints._asdict().items()}
+    return Joints(**chosen)
+
+
 def elastic_energy(joints: Joints, joint: int, vector: Array) -> Array:
     """Return the elastic energy (k,) in J of a joint at rotation vectors (k, 3) in rad.
 

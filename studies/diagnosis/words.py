@@ -32,7 +32,7 @@ SENTENCES = {
     "late_braking": "The car brakes {delay} after first contact.",
     "road_slope": "The road falls by {angle} along the travel.",
     "muscle_tone": "The muscles were tensed: {factor} times the resistance of neck and joints.",
-    "shoulder_compliance": "Shoulder and chest give way {factor} times as far.",
+    "shoulder_compliance": "The shoulder girdle gives way {factor} times as far.",
     "braced_posture": "The person was braced, {share} of the way.",
     "brake_dive": "The nose dives {angle} more than assumed.",
     "restitution": "The road gives back {factor} times the energy assumed.",

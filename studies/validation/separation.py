@@ -6,7 +6,8 @@ at a speed v under an angle, flies, lands and slides with friction mu to rest, s
     v (cos a + mu sin a) = sqrt(2 mu g (s - mu H))
 
 so that v lies between ``sqrt(2 mu g (s - mu H) / (1 + mu^2))`` and ``sqrt(2 mu g (s - mu H))`` for
-any upward angle. It says nothing about the way on the car, nor that v is the car's speed.
+any upward angle: bodies that leave falling are outside its bounds, not outside its relation. It
+says nothing about the way on the car, nor that v is the car's speed.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,9 +31,10 @@ TOUCH = 1.0
 
 
 def separations(cases: Sequence[Mapping[str, float]], *, workers: int = -1) -> pd.DataFrame:
-    """Return speed (m/s), height of fall (m), way to rest (m) and friction of runs from separation.
+    """Return how runs leave the car and what follows.
 
-    Runs that never leave the car, or are on the road before they do, are left out.
+    Columns: ``along``, ``up`` (m/s) of the centre of gravity, ``fall`` and ``way`` (m) from there
+    to rest, ``friction``. Runs that never leave the car, or land before they do, are left out.
 
     Parameters
     ----------
@@ -41,14 +43,14 @@ def separations(cases: Sequence[Mapping[str, float]], *, workers: int = -1) -> p
     parts = [list(cases[k : k + CHUNK]) for k in range(0, len(cases), CHUNK)]
     found = Parallel(n_jobs=workers)(delayed(_separate)(part) for part in parts)
     rows = [row for part in found for row in part]
-    return pd.DataFrame(rows, columns=["speed", "fall", "way", "friction"])
+    return pd.DataFrame(rows, columns=["along", "up", "fall", "way", "friction"])
 
 
-def _separate(cases: Sequence[Mapping[str, float]]) -> list[tuple[float, float, float, float]]:
+def _separate(cases: Sequence[Mapping[str, float]]) -> list[tuple[float, ...]]:
     model = load_model("multibody")
     zones = [f"contact_force_{zone.name}" for zone in load_vehicle(VEHICLE).zones]
     centre = [f"centre_of_gravity_{axis}" for axis in "xyz"]
-    rows = []
+    rows: list[tuple[float, ...]] = []
     for case in cases:
         run = model.observe(case, [*zones, "contact_force_road", *centre])
         force = run.histories["contact_force"]
@@ -67,7 +69,8 @@ def _separate(cases: Sequence[Mapping[str, float]]) -> list[tuple[float, float, 
         way = float(np.hypot(*(place[:2, -1] - place[:2, k])))
         rows.append(
             (
-                float(np.linalg.norm(rate)),
+                float(np.hypot(rate[0], rate[1])),
+                float(rate[2]),
                 float(place[2, k] - place[2, -1]),
                 way,
                 float(run.inputs["friction_body_road"]),
@@ -80,11 +83,23 @@ def _rate(time: Array) -> float:
     return 1.0 / float(time[1] - time[0])
 
 
-def share_within_searle(table: pd.DataFrame) -> float:
-    """Return the share of runs whose speed at separation lies within Searle's bounds."""
+def searle_speed(table: pd.DataFrame) -> Array:
+    """Return Searle's highest speed (m/s) of each run: that of a level departure."""
     mu = table["friction"].to_numpy()
     reach = np.maximum(table["way"].to_numpy() - mu * table["fall"].to_numpy(), 0.0)
-    highest = np.sqrt(2.0 * mu * STANDARD_GRAVITY * reach)
-    lowest = highest / np.sqrt(1.0 + mu**2)
-    speed = table["speed"].to_numpy()
+    return np.asarray(np.sqrt(2.0 * mu * STANDARD_GRAVITY * reach))
+
+
+def share_within_searle(table: pd.DataFrame) -> float:
+    """Return the share within Searle's bounds of the runs that leave the car upwards."""
+    rising = table[table["up"] >= 0.0]
+    speed = np.hypot(rising["along"].to_numpy(), rising["up"].to_numpy())
+    highest = searle_speed(rising)
+    lowest = highest / np.sqrt(1.0 + rising["friction"].to_numpy() ** 2)
     return float(np.mean((lowest <= speed) & (speed <= highest)))
+
+
+def median_searle_ratio(table: pd.DataFrame) -> float:
+    """Return the median speed by Searle's relation, each run at its own angle, over its speed."""
+    own = table["along"].to_numpy() + table["friction"].to_numpy() * table["up"].to_numpy()
+    return float(np.median(searle_speed(table) / own))

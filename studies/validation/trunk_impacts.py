@@ -102,10 +102,11 @@ def _simulate(table: pd.DataFrame) -> pd.DataFrame:
     """Return the tests with our peak force (kN) of each."""
     places = {name: (segment, side) for name, segment, side in REGIONS.values()}
     peaks = []
-    for row in table.itertuples():
-        body = build_body(float(row.age_y), float(row.stature_m), float(row.mass_kg))
-        segment, side = places[str(row.region)]
-        speed = float(row.speed_used_m_s)
+    columns = ["age_y", "stature_m", "mass_kg", "speed_used_m_s"]
+    for region, row in zip(table["region"], table[columns].to_numpy(dtype=float), strict=True):
+        age, stature, mass, speed = (float(value) for value in row)
+        body = build_body(age, stature, mass)
+        segment, side = places[region]
         impact = strike_region(body, build_joints(body), segment, HUB, speed, side)
         peaks.append(1e-3 * float(impact.force.max()))
     return table.assign(ours=peaks)

@@ -268,6 +268,7 @@ def one_zone(kind: int, slope: float) -> Zones:
         curvature=np.array([0.0]),
         box=np.array([[-9.0, 9.0, -9.0, 9.0]]),
         friction=np.array([0.3, 0.6]),
+        ploughing=np.zeros(1),
     )
 
 

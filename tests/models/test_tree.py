@@ -1,8 +1,8 @@
 """Tree dynamics against MuJoCo, conservation laws and closed or dense solutions."""
 
-import mujoco
 import numpy as np
 import pytest
+from mujoco_tree import mujoco_centres
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
@@ -20,7 +20,7 @@ from tree_stepping import (
 from models.multibody.kinematics import update_kinematics
 from models.multibody.setup import build_tree, place
 from models.multibody.sweeps import solve_accelerations
-from models.multibody.tree import Motion, Tree, empty_loads, empty_motion
+from models.multibody.tree import Tree, empty_loads, empty_motion
 from models.pedestrian.anthropometry import PARENTS, SEGMENTS, build_body
 from models.pedestrian.posture import standing_posture
 
@@ -43,54 +43,6 @@ def single_body() -> Tree:
         np.array([[0.010, 0.013, 0.020]]),
         np.zeros(1, dtype=np.bool_),
     )
-
-
-def mujoco_model(tree: Tree, gravity: float, step: float) -> tuple[mujoco.MjModel, list[int]]:
-    """Return the same tree as a MuJoCo model and the segments in its order."""
-    order: list[int] = []
-
-    def numbers(values: Array) -> str:
-        return " ".join(f"{v:.17g}" for v in values)
-
-    def element(i: int) -> str:
-        order.append(i)
-        joint = "<freejoint/>" if tree.parent[i] < 0 else '<joint type="ball"/>'
-        children = "".join(element(int(c)) for c in np.flatnonzero(tree.parent == i))
-        return (
-            f'<body pos="{numbers(tree.joint_in_parent[i])}">{joint}'
-            f'<inertial pos="{numbers(tree.centre_from_joint[i])}" mass="{tree.mass[i]:.17g}"'
-            f' diaginertia="{numbers(tree.inertia[i])}"/>{children}</body>'
-        )
-
-    text = (
-        f'<mujoco><option gravity="0 0 {-gravity}" integrator="RK4" timestep="{step}"/>'
-        f"<worldbody>{element(0)}</worldbody></mujoco>"
-    )
-    return mujoco.MjModel.from_xml_string(text), order
-
-
-def mujoco_centres(
-    tree: Tree, motion: Motion, gravity: float, duration: float, step: float
-) -> Array:
-    """Return the centres of mass after ``duration`` s by MuJoCo's fourth-order Runge-Kutta."""
-    model, order = mujoco_model(tree, gravity, step)
-    data = mujoco.MjData(model)
-    R = rotations(motion)
-    data.qpos[:3], data.qvel[:3] = motion.root_position, motion.root_velocity
-    data.qpos[3:7] = motion.orientation[0]
-    data.qvel[3:6] = R[0].inv().apply(motion.angular_velocity[0])
-    for k, i in enumerate(order[1:], start=1):
-        p = tree.parent[i]
-        # Ball joints: rotation against the parent, angular velocity against it in own axes.
-        data.qpos[3 + 4 * k : 7 + 4 * k] = (R[p].inv() * R[i]).as_quat(scalar_first=True)
-        relative = motion.angular_velocity[i] - motion.angular_velocity[p]
-        data.qvel[3 + 3 * k : 6 + 3 * k] = R[i].inv().apply(relative)
-    for _ in range(round(duration / step)):
-        mujoco.mj_step(model, data)
-    mujoco.mj_forward(model, data)
-    centres = np.empty((tree.mass.size, 3))
-    centres[order] = data.xipos[1:]
-    return centres
 
 
 @pytest.mark.parametrize("gravity", [0.0, GRAVITY])

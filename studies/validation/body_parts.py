@@ -12,6 +12,7 @@ from mcstudy.text import number
 from models.component.blunt_impact import BluntImpact, strike_region
 from models.component.joint_moment import passive_moment
 from models.component.neck_pendulum import PendulumTest, swing_neck
+from models.component.neck_sled import SledTest, ride_sled
 from models.criteria.units import STANDARD_GRAVITY
 from models.pedestrian.anthropometry import HEAD, Body, build_body
 from models.pedestrian.joints import Joints, build_joints
@@ -21,8 +22,13 @@ from studies.validation.check import Part, check, references
 
 Array = NDArray[np.float64]
 
-FACTORS = (1.0, 1.5, 2.0, 3.0)
+FACTORS = (1.0, 1.5, 2.2, 3.0)
 """Neck stiffness beside the nominal one."""
+DONOR = (49.0, 1.776, 69.9, 4.5)
+"""Age, stature (m), mass (kg) of the five donors of Kang 2018 on average [found]; head (kg)
+[recalled]."""
+SLED_FACTORS = (0.5, 0.7, 1.0, 1.5)
+"""Neck stiffness of the adult on the sled."""
 SHARE = 0.23
 """Child over adult passive moment: modulus times length cubed [estimated]."""
 
@@ -53,7 +59,17 @@ def validate(workers: int) -> Part:
     dummy = strike_region(six, build_joints(six), "chest", 2.86, 6.71)
     abdomen = strike_region(child, joints, "abdomen", 3.5, 6.3)
     moments, gap = _joint_moments(child, joints)
+    donor = build_body(*DONOR)
+    rides = {
+        factor: ride_sled(
+            donor, build_joints(donor, neck_stiffness=factor), np.array(table["neck_sled"]["pulse"])
+        )
+        for factor in SLED_FACTORS
+    }
+    ride = rides[1.0]
     checks = [
+        check("neck_sled_rotation", math.degrees(ride.rotation.max())),
+        check("neck_sled_time", 1e3 * float(ride.time[np.argmax(ride.rotation)])),
         check("neck_flexion_angle", math.degrees(flexion.angle.max())),
         check("neck_flexion_moment", flexion.moment.max()),
         check("neck_flexion_decay", 1e3 * flexion.decay_time(5.0)),
@@ -73,6 +89,9 @@ def validate(workers: int) -> Part:
         "dummy's corridors of rotation, moment and decay.":
         draw_panels([panel for name, entry in tests.items() for panel in _neck_panels(name, entry)],
                     height=3.1),
+        "Head and neck of adult donors on a sled (Kang 2018), our adult's at several neck "
+        "stiffnesses; green: the donors' range of the largest rotation and its time.":
+        _draw_sled(rides),
         "Blunt impacts from the front; green: donors (Ouyang) and dummy (572.124).":
         _draw_impacts(thorax, dummy, abdomen),
         "Passive moments: ours (stops of the child's range) and adult curves times 0.23; muscle "
@@ -121,6 +140,21 @@ def _neck_panels(direction: str, tests: dict[float, PendulumTest]) -> list[Panel
             )
         )  # fmt: skip
     return panels
+
+
+def _draw_sled(rides: dict[float, SledTest]) -> Figure:
+    rows = references()["checks"]
+    when, how_far = rows["neck_sled_time"], rows["neck_sled_rotation"]
+    band = Band(
+        np.array([when["low"], when["high"]]), np.full(2, how_far["low"]),
+        np.full(2, how_far["high"]), "donors' peak", style.GREEN,
+    )  # fmt: skip
+    curves = [
+        Curve(1e3 * ride.time, np.degrees(ride.rotation), f"stiffness {factor:g}", colour)
+        for (factor, ride), colour in zip(rides.items(), style.PALETTE, strict=False)
+    ]
+    panel = Panel("time [ms]", "rotation of the head [deg]", curves, [band], xlim=(0.0, 200.0))
+    return draw_panels([panel], columns=1, width=5.2, height=3.4)
 
 
 def _name(factor: float) -> str:

@@ -10,6 +10,7 @@ any upward angle: bodies that leave falling are outside its bounds, not outside 
 says nothing about the way on the car, nor that v is the car's speed.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -91,8 +92,10 @@ def searle_speed(table: pd.DataFrame) -> Array:
 
 
 def share_within_searle(table: pd.DataFrame) -> float:
-    """Return the share within Searle's bounds of the runs that leave the car upwards."""
+    """Return the share within Searle's bounds of runs that leave the car upwards (NaN: none)."""
     rising = table[table["up"] >= 0.0]
+    if rising.empty:
+        return math.nan
     speed = np.hypot(rising["along"].to_numpy(), rising["up"].to_numpy())
     highest = searle_speed(rising)
     lowest = highest / np.sqrt(1.0 + rising["friction"].to_numpy() ** 2)

@@ -131,11 +131,13 @@ def _words(name: str, table: pd.DataFrame, left: pd.DataFrame) -> str:
     """Say where the runs lie against the published relations."""
     errors = toor_wrap(_medians(table)) - SPEEDS
     side = "lower" if errors.mean() < 0.0 else "higher"
+    rising = int((left["up"] >= 0.0).sum())
+    share = f", {100.0 * share_within_searle(left):.0f} % of them within the bounds"
+    inside = share if rising else ""
     return (
         f"The {name}. Searle's bounds hold from the state in which a body leaves the car, not from "
-        f"first contact at the car's speed, and for bodies that leave it upwards: "
-        f"{int((left['up'] >= 0.0).sum())} of {len(left)} runs at friction 0.6 do, of which "
-        f"{100.0 * share_within_searle(left):.0f} % lie within them. With each run's own angle the "
+        "first contact at the car's speed, and for bodies that leave it upwards: "
+        f"{rising} of {len(left)} runs at friction 0.6 do{inside}. With each run's own angle the "
         f"relation gives {number(median_searle_ratio(left), 3)} times its speed (median). The "
         f"centre of gravity reaches {_efficiency(table):.2f} of the car's speed at first contact "
         "(median), as the car brakes and the body turns over its hood. "

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import StrMethodFormatter
 from numpy.typing import NDArray
 
 from mcstudy.figures import style
@@ -66,6 +67,16 @@ def draw_panels(
         for axes, panel in zip(grid.flat, panels, strict=False):
             _draw(axes, panel)
         return figure
+
+
+def use_log_scale(axes: Axes, which: Literal["x", "y"]) -> None:
+    """Give axes a logarithmic scale along x or y, its ticks in plain numbers.
+
+    The house's style takes dollar signs as text, so powers of ten would stand there as code.
+    """
+    axes.set(**{f"{which}scale": "log"})
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
 
 
 def _draw(axes: Axes, panel: Panel) -> None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mcstudy.errors import UserError
 from mcstudy.figures import style
-from mcstudy.figures.panels import Curve, Panel, draw_panels
+from mcstudy.figures.panels import Curve, Panel, draw_panels, use_log_scale
 from mcstudy.text import number
 from models.protocol import complete_status
 from models.registry import load_model
@@ -92,15 +92,17 @@ def validate(workers: int, measured: Path) -> Part:
         "HIC15 on the road [–]",
         "share of falls below [–]",
         [
-            Curve(measured_hic, _ranks(measured_hic), "dummies", "black", "", "o"),
+            Curve(measured_hic, _ranks(measured_hic), "17 dummy falls", "black", "", "o"),
             Curve(np.sort(child), _ranks(child), "three-year-old dummy", style.GREEN, "", "s"),
             Curve(ours, _ranks(ours), "ours, a three-year-old pushed", style.BLUE),
             Curve(struck, _ranks(struck), "ours, the case's child at 40 km/h", style.ORANGE),
         ],
         ylim=(0.0, 1.0),
+        xlim=(5.0, 2e4),
+        legend="upper left",
     )
-    figure = draw_panels([panel], columns=1, width=5.2, height=3.6)
-    figure.axes[0].set_xscale("log")
+    figure = draw_panels([panel], columns=1, width=6.4, height=4.2)
+    use_log_scale(figure.axes[0], "x")
     return Part(
         "Impact on the road", (words,), checks, {"Distribution of HIC15 on the road.": figure}
     )

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from mcstudy.figures import style
-from mcstudy.figures.panels import Band, Curve, Panel, draw_panels
+from mcstudy.figures.panels import Band, Curve, Panel, draw_panels, use_log_scale
 
 X = np.array([0.0, 1.0, 2.0])
 
@@ -95,3 +95,15 @@ def test_the_users_settings_are_left_alone() -> None:
     assert isinstance(title, Text)
     assert title.get_fontsize() == 11.0
     assert not figure.axes[0].spines["top"].get_visible()
+
+
+def test_ticks_of_a_logarithmic_axis_are_plain_numbers() -> None:
+    line = Curve(np.array([1.0, 1e4]), np.array([0.01, 100.0]))
+    figure = draw_panels([Panel("x [m]", "y [m]", [line])])
+    axes = figure.axes[0]
+    use_log_scale(axes, "x")
+    use_log_scale(axes, "y")
+    figure.canvas.draw()
+    shown = [text.get_text() for text in (*axes.get_xticklabels(), *axes.get_yticklabels())]
+    assert {"100", "0.01"} <= set(shown)
+    assert not any("$" in text for text in shown)

@@ -10,7 +10,7 @@ from models.compilation import kernel
 from models.contact.dent import PLOUGHING, ploughing_coefficient, pressure_share
 from models.crash.surfaces import PLOUGHING as PLOUGHING_CHANNEL
 from models.crash.surfaces import WORK_CHANNELS
-from models.registry import load_model
+from models.multibody.model import MultibodyModel
 
 
 @kernel
@@ -81,8 +81,8 @@ def test_ploughing_is_bounded_by_the_width_of_the_body() -> None:
 
 
 def test_panels_plough_and_rolls_do_not() -> None:
-    model = load_model("multibody")
-    names = {zone.name: zone.ploughing for zone in getattr(model, "vehicle").zones}  # noqa: B009
+    model = MultibodyModel()
+    names = {zone.name: zone.ploughing for zone in model.vehicle.zones}
     assert {name for name, share in names.items() if share > 0.0} == {
         "hood", "fender_side", "windscreen",
     }  # fmt: skip
@@ -99,7 +99,7 @@ def test_panels_plough_and_rolls_do_not() -> None:
 def test_an_adult_is_taken_along_by_the_windscreen() -> None:
     adult = {"age": 30.0, "stature": 1.74, "body_mass": 75.7, "head_mass": 4.54,
              "running_speed": 1.4, "yaw_rate": 0.0, "lateral_offset": 0.0}  # fmt: skip
-    model = load_model("multibody")
+    model = MultibodyModel()
     launched = [
         [model.run({**adult, "ploughing": p, "gait_phase": g}).outputs["launch_speed"]
          for g in (0.0, 0.3, 0.6)]

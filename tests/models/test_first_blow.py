@@ -8,10 +8,10 @@ import pytest
 from models.compilation import kernel
 from models.crash.record import S_GROUND_TIME, SUMMARY
 from models.crash.surfaces import Contacts, empty_contacts
+from models.multibody.model import MultibodyModel
 from models.multibody.recording import B_LAST, BLOW, note_blow, note_head
 from models.multibody.setup import build_crash
 from models.pedestrian.anthropometry import HEAD, SEGMENTS
-from models.registry import load_model
 
 
 @kernel
@@ -31,9 +31,9 @@ def _note(time, head, ellipsoids, motion, contacts, car, blow, head_contact, sum
 def test_the_arm_counts_if_it_braked_the_head(
     force: float, began: float, ended: float, counts: bool
 ) -> None:
-    model = load_model("multibody")
+    model = MultibodyModel()
     values = {item.name: item.nominal for item in model.inputs}
-    crash = build_crash(values, getattr(model, "vehicle"))  # noqa: B009
+    crash = build_crash(values, model.vehicle)
     assert crash is not None
     ellipsoids, motion = crash.scenario.ellipsoids, crash.motion
     zones = crash.scenario.zones.radius.size

@@ -194,3 +194,24 @@ def test_wrong_options_are_refused(wrong: dict[str, Any]) -> None:
 def test_it_is_registered() -> None:
     assert "planar" in model_names()
     assert load_model("planar").name == "planar"
+
+
+def test_a_neck_that_stretches_unburdens_the_head() -> None:
+    # The stiffer the neck, the more of the body the hood feels and the shorter the way of the head.
+    soft, stiff = (
+        load_model("planar").run({"neck_tension_stiffness": k}).outputs for k in (0.4, 4.0)
+    )
+    assert stiff["effective_head_mass"] > soft["effective_head_mass"] + 0.05
+    assert stiff["wad"] < soft["wad"] - 0.01
+
+
+def test_joints_that_yield_do_not_lose_their_limbs() -> None:
+    # Steps of 2 ms on the road, twenty times the finest: the points stay within their ranges.
+    scene = load_model("planar").run({}).scene
+    assert scene is not None
+    chest, arm = scene.names.index("chest"), scene.names.index("upper_arm_left")
+    neck, head = scene.names.index("neck"), scene.names.index("head")
+    for inner, outer in ((neck, head), (chest, arm)):
+        apart = np.linalg.norm(scene.centre[:, outer] - scene.centre[:, inner], axis=1)
+        largest = scene.semi_axes[inner].max() + scene.semi_axes[outer].max() + 0.05
+        assert apart.max() < largest

@@ -10,23 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.compilation import kernel
-from models.criteria.units import STANDARD_GRAVITY
+from models.component.head_and_neck import load_weights, mount_neck
 from models.multibody.bushings import apply_bushings
 from models.multibody.integration import correct, empty_memory, predict
 from models.multibody.joints import apply_joint_torques
 from models.multibody.kinematics import seat_joints, update_kinematics
 from models.multibody.sweeps import solve_accelerations
-from models.multibody.tree import Tree, empty_loads, empty_motion
-from models.pedestrian.anthropometry import SEGMENTS, Body
-from models.pedestrian.joints import Joints, joints_of
+from models.multibody.tree import empty_loads, empty_motion
+from models.pedestrian.anthropometry import Body
+from models.pedestrian.joints import Joints
 
 Array = NDArray[np.float64]
 
 ARM, GAUGE = 1.80, 1.657
 """m from the pivot to the base of the neck and to the point whose speed is prescribed (recalled:
 49 CFR 572.33, figure 22)."""
-HEAVY = 1e8
-"""Mass (kg) and inertia (kg m2) of the pendulum: beyond what head and neck can move."""
 STEP = 2e-5
 """s; the lightest segment's damping rate times it stays below one half."""
 DURATION = 0.25
@@ -70,12 +68,7 @@ def _swing(
         if k > 0:
             predict(tree, motion, loads, memory, step)
         update_kinematics(tree, motion)
-        for i in range(tree.mass.shape[0]):
-            for j in range(3):
-                loads.force[i, j] = 0.0
-                loads.torque[i, j] = 0.0
-            if i > 0:
-                loads.force[i, 2] = -tree.mass[i] * STANDARD_GRAVITY
+        load_weights(tree, loads)
         loads.torque[0, 1] = rates[k] * tree.inertia[0, 1]
         apply_joint_torques(tree, joints, motion, loads, power)
         apply_bushings(tree, joints, motion, loads, power)
@@ -115,20 +108,8 @@ def swing_neck(
         raise ValueError("the pulse must begin at 0 s with nothing lost")
     if not np.isclose(pulse[-1, 1], speed):
         raise ValueError(f"the pulse ends at {pulse[-1, 1]:g} m/s, not at the speed {speed:g} m/s")
-    rows = [SEGMENTS.index("neck"), SEGMENTS.index("head")]
-    chain = [0, *rows]
-    tree = Tree(
-        parent=np.array([-1, 0, 1], dtype=np.int64),
-        joint_in_parent=np.array(
-            [[0.0] * 3, [0.0, 0.0, ARM], body.joint[rows[1]] - body.joint[rows[0]]]
-        ),
-        centre_from_joint=np.vstack([np.zeros(3), body.centre[rows] - body.joint[rows]]),
-        mass=np.array([HEAVY, *body.mass[rows]]),
-        inertia=np.vstack([np.full(3, HEAVY), body.inertia[rows]]),
-        yields=joints.yields[chain],
-    )
-    held = joints_of(joints, chain)
-    n = len(chain)
+    tree, held = mount_neck(body, joints, np.array([0.0, 0.0, ARM]))
+    n = tree.mass.size
     motion, loads = empty_motion(n), empty_loads(n)
     motion.orientation[:] = _FACING[direction]
     motion.angular_velocity[:, 1] = -speed / GAUGE

@@ -10,20 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.compilation import kernel
-from models.criteria.units import STANDARD_GRAVITY
+from models.component.head_and_neck import load_weights, mount_neck
 from models.multibody.bushings import apply_bushings
 from models.multibody.integration import correct, empty_memory, predict
 from models.multibody.joints import apply_joint_torques
 from models.multibody.kinematics import seat_joints, update_kinematics
 from models.multibody.sweeps import solve_accelerations
-from models.multibody.tree import Tree, empty_loads, empty_motion
-from models.pedestrian.anthropometry import SEGMENTS, Body
-from models.pedestrian.joints import Joints, joints_of
+from models.multibody.tree import empty_loads, empty_motion
+from models.pedestrian.anthropometry import Body
+from models.pedestrian.joints import Joints
 
 Array = NDArray[np.float64]
 
-HEAVY = 1e8
-"""Mass (kg) and inertia (kg m2) of the sled: beyond what head and neck can move."""
 STEP = 2e-5
 """s."""
 DURATION = 0.25
@@ -55,12 +53,7 @@ def _ride(tree, joints, motion, loads, memory, power, pulse, step, out):
             turned += 0.5 * step * motion.angular_velocity[head, 1]
             predict(tree, motion, loads, memory, step)
         update_kinematics(tree, motion)
-        for i in range(tree.mass.shape[0]):
-            for j in range(3):
-                loads.force[i, j] = 0.0
-                loads.torque[i, j] = 0.0
-            if i > 0:
-                loads.force[i, 2] = -tree.mass[i] * STANDARD_GRAVITY
+        load_weights(tree, loads)
         loads.force[0, 0] = pulse[k] * tree.mass[0]
         apply_joint_torques(tree, joints, motion, loads, power)
         apply_bushings(tree, joints, motion, loads, power)
@@ -92,24 +85,15 @@ def ride_sled(body: Body, joints: Joints, pulse: Array) -> SledTest:
     pulse = np.asarray(pulse, dtype=np.float64)
     if pulse.ndim != 2 or np.any(np.diff(pulse[:, 0]) <= 0.0):
         raise ValueError("the pulse must be rows of time and acceleration, times rising")
-    rows = [SEGMENTS.index("neck"), SEGMENTS.index("head")]
-    chain = [0, *rows]
-    tree = Tree(
-        parent=np.array([-1, 0, 1], dtype=np.int64),
-        joint_in_parent=np.array([[0.0] * 3, [0.0] * 3, body.joint[rows[1]] - body.joint[rows[0]]]),
-        centre_from_joint=np.vstack([np.zeros(3), body.centre[rows] - body.joint[rows]]),
-        mass=np.array([HEAVY, *body.mass[rows]]),
-        inertia=np.vstack([np.full(3, HEAVY), body.inertia[rows]]),
-        yields=joints.yields[chain],
-    )
-    n = len(chain)
+    tree, held = mount_neck(body, joints, np.zeros(3))
+    n = tree.mass.size
     motion = empty_motion(n)
     seat_joints(tree, motion)
     time: Array = np.arange(round(DURATION / STEP) + 1, dtype=np.float64) * STEP
     pushed = -np.interp(time, pulse[:, 0], pulse[:, 1], left=0.0, right=0.0)
     out = np.zeros((time.size, 2))
     _ride(
-        tree, joints_of(joints, chain), motion, empty_loads(n), empty_memory(n), np.zeros(2),
+        tree, held, motion, empty_loads(n), empty_memory(n), np.zeros(2),
         pushed, STEP, out,
     )  # fmt: skip
     return SledTest(time, out[:, 0].copy(), out[:, 1].copy())

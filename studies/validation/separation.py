@@ -84,11 +84,17 @@ def _rate(time: Array) -> float:
     return 1.0 / float(time[1] - time[0])
 
 
-def searle_speed(table: pd.DataFrame) -> Array:
-    """Return Searle's highest speed (m/s) of each run: that of a level departure."""
+def searle(distance: Array, friction: Array | float) -> tuple[Array, Array]:
+    """Return Searle's lowest and highest speed (m/s) for a throw distance (m)."""
+    highest = np.sqrt(2.0 * friction * STANDARD_GRAVITY * distance)
+    return highest / np.sqrt(1.0 + np.square(friction)), highest
+
+
+def _searle_of(table: pd.DataFrame) -> tuple[Array, Array]:
+    """Return Searle's bounds (m/s) for the ways of runs, each less what its fall is worth."""
     mu = table["friction"].to_numpy()
-    reach = np.maximum(table["way"].to_numpy() - mu * table["fall"].to_numpy(), 0.0)
-    return np.asarray(np.sqrt(2.0 * mu * STANDARD_GRAVITY * reach))
+    reach = table["way"].to_numpy() - mu * table["fall"].to_numpy()
+    return searle(np.maximum(reach, 0.0), mu)
 
 
 def share_within_searle(table: pd.DataFrame) -> float:
@@ -97,12 +103,11 @@ def share_within_searle(table: pd.DataFrame) -> float:
     if rising.empty:
         return math.nan
     speed = np.hypot(rising["along"].to_numpy(), rising["up"].to_numpy())
-    highest = searle_speed(rising)
-    lowest = highest / np.sqrt(1.0 + rising["friction"].to_numpy() ** 2)
+    lowest, highest = _searle_of(rising)
     return float(np.mean((lowest <= speed) & (speed <= highest)))
 
 
 def median_searle_ratio(table: pd.DataFrame) -> float:
     """Return the median speed by Searle's relation, each run at its own angle, over its speed."""
     own = table["along"].to_numpy() + table["friction"].to_numpy() * table["up"].to_numpy()
-    return float(np.median(searle_speed(table) / own))
+    return float(np.median(_searle_of(table)[1] / own))

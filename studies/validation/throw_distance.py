@@ -23,12 +23,6 @@ FRICTIONS = (0.5, 0.6, 0.7)
 PHASES = (0.0, 0.17, 0.33, 0.5, 0.67, 0.83)
 
 
-def searle(distance: Array, friction: Array | float) -> tuple[Array, Array]:
-    """Return Searle's lowest and highest speed (m/s) for a throw distance (m)."""
-    highest = np.sqrt(2.0 * friction * STANDARD_GRAVITY * distance)
-    return highest / np.sqrt(1.0 + np.square(friction)), highest
-
-
 def toor_wrap(distance: Array) -> Array:
     """Return the speed (km/h) of Toor and Araszewski 2003 for wrap (recalled)."""
     return 9.84 * np.asarray(distance) ** 0.57

@@ -22,7 +22,14 @@ from mcstudy.results import ResultsFolder
 from models.component.neck_pendulum import swing_neck
 from models.pedestrian.anthropometry import build_body
 from models.pedestrian.joints import build_joints
-from studies.validation import dummy_head, head_impact, headform_impacts, numerics, throw_distance
+from studies.validation import (
+    dummy_head,
+    head_impact,
+    headform_impacts,
+    numerics,
+    separation,
+    throw_distance,
+)
 from studies.validation import parts as parts_module
 from studies.validation import report as report_module
 from studies.validation.check import Check, Part, check, references
@@ -124,7 +131,7 @@ def test_the_excuse_of_the_neck_holds() -> None:
 )
 def test_searle_at_fourteen_metres(friction: float, low: float, high: float) -> None:
     # Data sheet, section 6, to the printed digit; its g of 9.81 is 0.01 km/h.
-    found = 3.6 * np.array(throw_distance.searle(np.array(14.0), friction))
+    found = 3.6 * np.array(separation.searle(np.array(14.0), friction))
     np.testing.assert_allclose(found, [low, high], atol=0.06)
     assert found[1] / found[0] == pytest.approx(math.sqrt(1.0 + friction**2), rel=1e-12)
 

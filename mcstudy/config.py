@@ -2,25 +2,23 @@
 
 import hashlib
 import json
-import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, ValidationError
 
 from mcstudy import designs, units
-from mcstudy.errors import UserError
+from mcstudy.errors import UserError, on_one_line
+from mcstudy.files import parse_toml, read_study_text
 from mcstudy.inputs import (
-    DISTRIBUTION_NAMES,
     copula_factor,
     sample_values,
     sampling_order,
 )
 from mcstudy.schema import (
-    KINDS,
     CommonStudy,
     ComparisonRow,
     ComparisonTable,
@@ -53,6 +51,11 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
+LONGEST = 200
+"""Characters of a message, above which it is cut."""
+_MIXED = {"options": "a text, a number or a list of pairs of numbers",
+          "fixed": "a number or a list of pairs of numbers"}  # fmt: skip
+"""What the tables hold whose values may be of several types."""
 _STUDY: TypeAdapter[Study] = TypeAdapter(Annotated[Study, Field(discriminator="kind")])
 
 
@@ -65,58 +68,69 @@ def load_study(path: Path | str) -> Study:
         If the file cannot be read or something in it is wrong; the message names the file and the
         place in it.
     """
-    path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: cannot be read ({error})") from None
-    return parse_study(text, str(path))
+    return parse_study(read_study_text(path), str(path))
 
 
 def parse_study(text: str, source: str = "study") -> Study:
     """Check the text of a study file; see ``load_study``."""
-    try:
-        table = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise UserError(f"{source}: not valid TOML: {_one_line(error)}") from None
+    table = parse_toml(text, source)
     try:
         return _STUDY.validate_python(table)
     except ValidationError as error:
-        raise UserError(f"{source}: {first_problem(error)}") from None
+        raise UserError(f"{source}: {first_problem(error, table)}") from None
 
 
-def first_problem(error: ValidationError) -> str:
-    """Return the first problem of a table, on one line, with its place."""
+def first_problem(error: ValidationError, table: Mapping[str, Any]) -> str:
+    """Return the first problem of a table, on one line, with its place in the file.
+
+    Parameters
+    ----------
+    error : of the check. table : as it was read.
+    """
     problem = error.errors(include_url=False)[0]
-    parts = [str(part) for part in problem["loc"]]
-    # Pydantic puts the chosen kind of study and of distribution into the place; the file does not.
-    if parts and parts[0] in KINDS:
-        parts = parts[1:]
-    for k in range(len(parts) - 2):
-        if parts[k] == "inputs" and parts[k + 2] in DISTRIBUTION_NAMES:
-            del parts[k + 2]
-            break
-    mixed = "options" in parts[:-1] and parts[0] in ("model", "fronts")
-    if mixed:
-        parts = parts[: parts.index("options") + 2]
-    place = _one_line(".".join(parts) or "study")
-    if mixed:
-        return f"{place}: must be a text, a number or a list of pairs of numbers"
     kind = problem["type"]
+    parts, typed = _place_in(table, problem["loc"], missing=kind == "missing")
+    place = on_one_line(".".join(parts) or "study", LONGEST)
+    mixed = next((part for part in parts if part in _MIXED), None)
+    if mixed is not None and typed >= parts.index(mixed) + 2:
+        place = on_one_line(".".join(parts[: parts.index(mixed) + 2]), LONGEST)
+        return f"{place}: must be {_MIXED[mixed]}"
     if kind == "extra_forbidden":
         return f"{place}: unknown key"
     if kind == "missing":
         return f"{place}: missing"
-    message = _one_line(problem["msg"].removeprefix("Value error, "))
+    message = on_one_line(problem["msg"].removeprefix("Value error, "), LONGEST)
     given = problem.get("input")
-    shown = f" (given {_one_line(repr(given))})" if isinstance(given, str | int | float) else ""
+    shown = (
+        f" (given {on_one_line(repr(given), 60)})" if isinstance(given, str | int | float) else ""
+    )
     return f"{place}: {message}{shown}"
 
 
-def _one_line(text: object, longest: int = 200) -> str:
-    """Return a text on one line, cut where it is long."""
-    line = " ".join(str(text).split())
-    return line if len(line) <= longest else line[:longest] + "..."
+def _place_in(
+    table: object, location: tuple[int | str, ...], *, missing: bool
+) -> tuple[list[str], int]:
+    """Return the parts of a location that the file has, and after how many another stood last.
+
+    Pydantic puts the chosen kind of study and of distribution into a location, and the type that
+    it tried; the file does not have them. What is missing is the last part.
+    """
+    parts: list[str] = []
+    other = 0
+    for k, part in enumerate(location):
+        inside = (
+            part in table
+            if isinstance(table, Mapping)
+            else isinstance(table, Sequence) and isinstance(part, int) and part < len(table)
+        )
+        if inside:
+            table = table[part]  # type: ignore[index]
+            parts.append(str(part))
+        elif missing and k == len(location) - 1:
+            parts.append(str(part))
+        else:
+            other = len(parts)
+    return parts, other
 
 
 def fixed_values(study: CommonStudy, model: Simulator) -> dict[str, float]:

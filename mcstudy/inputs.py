@@ -11,8 +11,17 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    model_validator,
+)
 from scipy import special, stats
+
+from mcstudy import units
 
 Array = NDArray[np.float64]
 
@@ -21,6 +30,8 @@ SMALLEST_SHARE = 1e-20
 """Probability below which a truncation that leaves no more counts as a mistake (assumed)."""
 
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
+Unit = Annotated[str, AfterValidator(units.canonical)]
+"""A unit, whatever its spelling; one that no quantity has is refused where it is used."""
 
 
 class _Table(BaseModel):
@@ -28,7 +39,7 @@ class _Table(BaseModel):
 
 
 class _Distribution(_Table):
-    unit: str = "1"
+    unit: Unit = "1"
 
     @property
     def parents(self) -> tuple[str, ...]:
@@ -219,9 +230,6 @@ class GrowthChart(_Truncated):
 Distribution = Annotated[
     Uniform | Triangular | Normal | LogNormal | GrowthChart, Field(discriminator="distribution")
 ]
-
-
-DISTRIBUTION_NAMES = ("uniform", "triangular", "normal", "lognormal", "growth-chart")
 
 
 def sampling_order(distributions: Mapping[str, Distribution]) -> list[str]:

@@ -6,16 +6,16 @@
     tests.csv         one row a test: id, recorded inputs, measured scalars
     signals/<id>.csv  time (s) and channels of a test
 
-A signal is named after the model's history that it measures, ``<group>_<channel>``, for example
-``head_acceleration``. Folders of ISO-MME tests are read into the same structure.
+Tables are as ``mcstudy.tables`` reads them. A signal is named after the model's history that it
+measures, ``<group>_<channel>``, for example ``head_acceleration``. Folders of ISO-MME tests are
+read into the same structure.
 """
 
-import csv
 import re
-import tomllib
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import pandas as pd
@@ -25,13 +25,16 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 from mcstudy import isomme, units
 from mcstudy.config import first_problem
 from mcstudy.errors import UserError
-from mcstudy.inputs import Distribution
+from mcstudy.files import parse_toml, read_study_text
+from mcstudy.inputs import Distribution, Unit
+from mcstudy.tables import TextTable, read_csv
 
 Array = NDArray[np.float64]
 
 FORMAT = "mcstudy-measured/1"
 HEADER = "measured.toml"
 
+EMPTY = "leave a field empty where nothing was measured"
 FEWEST_SAMPLES = 8
 """Samples below which a signal cannot be used."""
 
@@ -43,14 +46,14 @@ class _Table(BaseModel):
 class Recorded(_Table):
     """A recorded input or a measured scalar: a column of ``tests.csv``, unit, uncertainty."""
 
-    unit: str = "1"
+    unit: Unit = "1"
     sd: Annotated[FiniteFloat, Field(ge=0.0)] = 0.0
 
 
 class Signal(_Table):
     """A channel: unit, standard deviation of its white noise after the filter, the filter."""
 
-    unit: str = "1"
+    unit: Unit = "1"
     sd: Annotated[FiniteFloat, Field(ge=0.0)] = 0.0
     filter: Literal["none", "CFC60", "CFC180", "CFC600", "CFC1000"] = "none"
 
@@ -84,12 +87,14 @@ class Measured:
     tests : table, a row a test: ``test`` and the columns of inputs and scalars, in the header's
         units; NaN where a scalar was not measured.
     signals : by test and channel, (n, 2) time (s) and value in the channel's unit.
+    notes : what was taken and left out where there was a choice, by test.
     """
 
     source: Path
     header: Header
     tests: pd.DataFrame
     signals: dict[str, dict[str, Array]]
+    notes: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def input_value(self, name: str, test: int, unit: str) -> tuple[float, float] | None:
         """Return a recorded input of row ``test`` and its standard uncertainty in ``unit``.
@@ -129,8 +134,13 @@ class Measured:
         return table[:, 0], table[:, 1] * scale
 
 
-def load_measured(folder: Path | str) -> Measured:
+def load_measured(folder: Path | str, channels: Sequence[str] = ()) -> Measured:
     """Read a folder of measured data: the format above, an ISO-MME test, or a folder of those.
+
+    Parameters
+    ----------
+    folder : of the data.
+    channels : of ISO-MME tests, which to take; see ``mcstudy.isomme.head_acceleration``.
 
     Raises
     ------
@@ -141,28 +151,30 @@ def load_measured(folder: Path | str) -> Measured:
     if not folder.is_dir():
         raise UserError(f"{folder}: is no folder of measured data")
     if (folder / HEADER).exists():
+        if channels:
+            raise UserError(f"{folder}: --channel is for ISO-MME tests; {HEADER} names the signals")
         return _read_folder(folder)
     tests = isomme.find_tests(folder)
     if tests:
-        return _from_isomme(folder, [isomme.read_test(path) for path in tests])
+        return _from_isomme(folder, [isomme.read_test(path) for path in tests], channels)
     raise UserError(f"{folder}: holds neither {HEADER} nor an ISO-MME test (.mme)")
 
 
 def _read_folder(folder: Path) -> Measured:
     place = folder / HEADER
+    table = parse_toml(read_study_text(place), str(place))
     try:
-        table = tomllib.loads(place.read_text(encoding="utf-8"))
         header = Header.model_validate(table)
     except ValidationError as error:
-        raise UserError(f"{place}: {first_problem(error)}") from None
-    except (OSError, ValueError, RecursionError) as error:
-        raise UserError(f"{place}: cannot be read ({error})") from None
+        raise UserError(f"{place}: {first_problem(error, table)}") from None
     if "test" in {*header.inputs, *header.scalars}:
         raise UserError(f"{place}: 'test' is the id of a test, it cannot be an input or a scalar")
-    tests = _read_csv(folder / "tests.csv", text=("test",))
-    for column in ("test", *header.inputs, *header.scalars):
-        if column not in tests.columns:
+    named = read_csv(folder / "tests.csv", text=("test",))
+    wanted = ("test", *header.inputs, *header.scalars)
+    for column in wanted:
+        if column not in named.columns:
             raise UserError(f"{folder / 'tests.csv'}: column {column!r} is missing")
+    tests = _frame(named)
     if tests.empty:
         raise UserError(f"{folder / 'tests.csv'}: holds no tests")
     lines = tests.index
@@ -194,7 +206,7 @@ def _read_folder(folder: Path) -> Measured:
         if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,79}", test):
             raise UserError(f"{folder / 'tests.csv'}: test id {test[:80]!r} cannot name a file")
         path = folder / "signals" / f"{test}.csv"
-        frame = _read_csv(path)
+        frame = _frame(read_csv(path))
         if frame.columns[0] != "time":
             raise UserError(f"{path}: line 1: the first column must be 'time' (s)")
         if not any(name in frame.columns for name in header.signals):
@@ -224,47 +236,13 @@ def _series(path: Path, frame: pd.DataFrame, name: str) -> Array:
     return table
 
 
-def _read_csv(path: Path, text: tuple[str, ...] = ()) -> pd.DataFrame:
-    """Return a table of numbers (NaN where empty) and of the columns that are text.
-
-    Its index holds the lines of the file.
-    """
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file, strict=True)
-            numbered = [(reader.line_num, row) for row in reader if row]
-    except (OSError, ValueError, csv.Error) as error:
-        raise UserError(f"{path}: cannot be read ({error})") from None
-    (_, head), *body = numbered or [(1, [])]
-    if not head or len(set(head)) < len(head):
-        raise UserError(f"{path}: line 1 must name the columns, each once")
-    lines = [line for line, _ in body]
-    for line, row in body:
-        if len(row) != len(head):
-            raise UserError(f"{path}: line {line} has {len(row)} fields, not {len(head)}")
-    columns: dict[str, Any] = {}
-    for k, name in enumerate(head):
-        values = [row[k] for _, row in body]
-        columns[name] = values if name in text else _numbers(path, name, values, lines)
-    return pd.DataFrame(columns, index=pd.Index(lines, dtype=np.int64))
-
-
-def _numbers(path: Path, name: str, values: list[str], lines: list[int]) -> Array:
-    """Return a column of numbers, NaN where a field is empty."""
-    column = np.full(len(values), np.nan)
-    for k, value in enumerate(values):
-        if not value.strip():
-            continue
-        try:
-            column[k] = float(value)
-        except ValueError:
-            column[k] = np.nan
-        if not np.isfinite(column[k]):
-            raise UserError(
-                f"{path}: line {lines[k]}: column {name!r} must hold numbers, not {value[:40]!r}; "
-                "leave a field empty where nothing was measured"
-            )
-    return column
+def _frame(table: TextTable) -> pd.DataFrame:
+    """Return a table whose columns are numbers but for those of text, by line of the file."""
+    columns = {
+        name: fields if name in table.text else table.numbers(name, advice=EMPTY)
+        for name, fields in table.columns.items()
+    }
+    return pd.DataFrame(columns, index=pd.Index(table.lines, dtype=np.int64))
 
 
 def _check_unit(place: Path, key: str, name: str) -> None:
@@ -276,15 +254,28 @@ def _check_unit(place: Path, key: str, name: str) -> None:
         )
 
 
-def _from_isomme(folder: Path, tests: list[isomme.Test]) -> Measured:
+def _from_isomme(folder: Path, tests: Sequence[isomme.Test], channels: Sequence[str]) -> Measured:
     """Return ISO-MME tests of a headform: speed, mass and head acceleration."""
-    rows, signals = [], {}
+    rows, signals, notes = [], {}, {}
     filters = set()
     for test in tests:
-        channel = isomme.head_acceleration(test)
+        found = isomme.head_acceleration(test, channels)
+        speed, mass = test.velocity_of(found.object), test.mass_of(found.object)
+        if not (np.isfinite(speed) and np.isfinite(mass)):
+            raise UserError(
+                f"{test.name}: 'Velocity test object {found.object}' and 'Mass test object "
+                f"{found.object}' must be given"
+            )
+        channel = found.channel
+        if channel.time.size < FEWEST_SAMPLES:
+            raise UserError(
+                f"{test.name}: {channel.code} holds {channel.time.size} samples, {FEWEST_SAMPLES} "
+                "are needed"
+            )
         filters.add(channel.filter)
-        rows.append({"test": test.name, "impact_speed": test.velocity, "headform_mass": test.mass})
+        rows.append({"test": test.name, "impact_speed": speed, "headform_mass": mass})
         signals[test.name] = {"head_acceleration": np.stack([channel.time, channel.values], 1)}
+        notes[test.name] = found.notes
     if len(filters) > 1:
         raise UserError(f"{folder}: head accelerations are filtered differently: {sorted(filters)}")
     table = pd.DataFrame(rows)
@@ -299,4 +290,4 @@ def _from_isomme(folder: Path, tests: list[isomme.Test]) -> Measured:
             "signals": {"head_acceleration": {"unit": "g", "filter": filters.pop()}},
         }
     )
-    return Measured(folder, header, table, signals)
+    return Measured(folder, header, table, signals, notes)

@@ -1,7 +1,7 @@
 """What a study file may hold: one class a table, one class a kind of study."""
 
 import re
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal
 
 from pydantic import (
     BaseModel,
@@ -14,7 +14,7 @@ from pydantic import (
 )
 
 from mcstudy import designs
-from mcstudy.inputs import Distribution
+from mcstudy.inputs import Distribution, Unit
 from mcstudy.sensitivity.blocks import FEWEST_BLOCKS
 from mcstudy.sensitivity.factors import DUMMY
 
@@ -51,7 +51,7 @@ class Value(StudyTable):
     """A fixed input: value and unit."""
 
     value: FiniteFloat
-    unit: str = "1"
+    unit: Unit = "1"
 
 
 class Reference(StudyTable):
@@ -59,7 +59,7 @@ class Reference(StudyTable):
 
     output: str
     value: FiniteFloat
-    unit: str = "1"
+    unit: Unit = "1"
     label: str
     kind: Literal["observed", "limit", "simulated"] = "observed"
 
@@ -162,7 +162,7 @@ class ComparisonTable(StudyTable):
     """A table of outputs: title, outputs with the unit of the printed values, rows."""
 
     title: str
-    units: dict[str, str]
+    units: dict[str, Unit]
     rows: list[ComparisonRow]
 
 
@@ -378,7 +378,3 @@ class ModelComparison(AnyStudy, Limits):
 
 Study = MonteCarloStudy | Reconstruction | SobolStudy | MorrisStudy | InjuryStudy | ModelComparison
 SampledStudy = MonteCarloStudy | SobolStudy | MorrisStudy
-KINDS: tuple[str, ...] = tuple(
-    get_args(kind.model_fields["kind"].annotation)[0] for kind in get_args(Study)
-)
-"""What ``kind`` may be."""

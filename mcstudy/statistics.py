@@ -5,6 +5,7 @@ probabilities. Latin hypercube and Sobol' samples are not independent; their int
 spread of the estimate between independent replicates (Student's t).
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
@@ -17,6 +18,8 @@ Array = NDArray[np.float64]
 CONFIDENCE = 0.95
 REACH = float(stats.norm.ppf(0.5 + CONFIDENCE / 2.0))
 """Standard deviations of a normal interval on either side."""
+ROUNDING = 1e-12
+"""Spread over size up to which values count as one value: sums round by less (assumed)."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,30 @@ class Estimate:
     def as_dict(self) -> dict[str, float]:
         """Return the three numbers by name."""
         return asdict(self)
+
+    def times(self, factor: float) -> "Estimate":
+        """Return the estimate of values that are larger by a factor."""
+        return Estimate(factor * self.value, factor * self.low, factor * self.high)
+
+
+def varies(values: Array) -> bool:
+    """Tell whether the finite values differ by more than rounding."""
+    part = values[np.isfinite(values)]
+    if part.size < 2:
+        return False
+    low, high = float(part.min()), float(part.max())
+    # Halves, as the difference of the largest numbers is none.
+    return 0.5 * high - 0.5 * low > 0.5 * ROUNDING * max(abs(low), abs(high))
+
+
+def scale_of(values: Array) -> float:
+    """Return about the largest size of the finite values, as a power of two.
+
+    Values over their scale have the same digits and squares that neither overflow nor vanish.
+    """
+    part = values[np.isfinite(values)]
+    exponent = math.frexp(float(np.abs(part).max(initial=0.0)))[1]
+    return math.ldexp(1.0, min(max(exponent, -1000), 1000))
 
 
 def mean(values: Array, replicate: NDArray[np.int64] | None = None) -> Estimate:
@@ -97,20 +124,28 @@ def probability(hits: NDArray[np.bool_], replicate: NDArray[np.int64] | None = N
 
 
 def describe(values: Array, replicate: NDArray[np.int64] | None = None) -> dict[str, object]:
-    """Return mean, standard deviation and quantiles of the finite values, with intervals."""
+    """Return mean, standard deviation and quantiles of the finite values, with intervals.
+
+    Values that do not vary have a standard deviation of zero, and no interval.
+    """
     finite = np.isfinite(values)
     part = values[finite]
     groups = None if replicate is None else replicate[finite]
+    counts: dict[str, object] = {"n": int(part.size), "undefined": int((~finite).sum())}
     if part.size < 2:
-        return {"n": int(part.size), "undefined": int((~finite).sum())}
-    return {
-        "n": int(part.size),
-        "undefined": int((~finite).sum()),
-        "mean": mean(part, groups).as_dict(),
-        "sd": standard_deviation(part, groups).as_dict(),
-        "quantiles": {
-            f"{p:g}": quantile(part, p, groups).as_dict() for p in (0.05, 0.25, 0.5, 0.75, 0.95)
-        },
+        return counts
+    chosen = (0.05, 0.25, 0.5, 0.75, 0.95)
+    if not varies(part):
+        one = Estimate(float(part[0]), np.nan, np.nan).as_dict()
+        nothing = Estimate(0.0, np.nan, np.nan).as_dict()
+        quantiles = {f"{p:g}": one for p in chosen}
+        return counts | {"mean": one, "sd": nothing, "quantiles": quantiles}
+    scale = scale_of(part)
+    part = part / scale
+    return counts | {
+        "mean": mean(part, groups).times(scale).as_dict(),
+        "sd": standard_deviation(part, groups).times(scale).as_dict(),
+        "quantiles": {f"{p:g}": quantile(part, p, groups).times(scale).as_dict() for p in chosen},
     }
 
 

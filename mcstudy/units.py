@@ -31,6 +31,25 @@ _UNITS: dict[str, tuple[str, float]] = {
     "N/m": ("stiffness", 1.0),
     "m/N": ("compliance", 1.0),
 }
+_SPELLINGS = {
+    "-": "1", "percent": "%", "kph": "km/h", "kmh": "km/h", "km/hr": "km/h",
+    "degree": "deg", "degrees": "deg", "°": "deg", "radian": "rad", "years": "year",
+    "months": "month", "deg/sec": "deg/s", "m/sec": "m/s", "sec": "s",
+    "m/(s*s)": "m/s2", "m/s^2": "m/s2", "m/s²": "m/s2", "m/s/s": "m/s2", "m/s**2": "m/s2",
+    "rad/(s*s)": "rad/s2", "rad/s^2": "rad/s2", "rad/s²": "rad/s2", "rad/s**2": "rad/s2",
+    "ns/m": "N s/m", "n*s/m": "N s/m",
+}  # fmt: skip
+"""Other ways to write a unit, in lower case."""
+_LOWER = {name.lower(): name for name in _UNITS}
+
+
+def canonical(name: str) -> str:
+    """Return a unit as it is named here, whatever its case or spelling; unknown ones as given.
+
+    No two units here differ in case alone.
+    """
+    lower = " ".join(name.split()).lower()
+    return name if name in _UNITS else _LOWER.get(lower, _SPELLINGS.get(lower, name))
 
 
 def unit_names() -> tuple[str, ...]:
@@ -46,6 +65,7 @@ def factor(unit: str, target: str) -> float:
     ValueError
         If a unit is unknown or the two measure different things.
     """
+    unit, target = canonical(unit), canonical(target)
     for name in (unit, target):
         if name not in _UNITS:
             raise ValueError(f"unknown unit {name!r}: use one of {', '.join(_UNITS)}")

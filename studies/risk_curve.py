@@ -10,7 +10,7 @@ from mcstudy import units
 from mcstudy.config import InjuryStudy, load_study
 from mcstudy.errors import UserError
 from mcstudy.figures import risk, style
-from mcstudy.injury.cases import observations_of, read_table
+from mcstudy.injury.cases import observations_of, read_cases, read_parquet
 from mcstudy.injury.risk_curve import INFLUENTIAL, describe_risk
 from mcstudy.report import Section, Table
 from mcstudy.results import ResultsFolder
@@ -95,11 +95,11 @@ def _read(source: Path, stimulus: str, scenario: str | None) -> tuple[pd.DataFra
     if not source.is_dir():
         if scenario is not None:
             raise UserError(f"{source}: is no injury study, it has no scenario {scenario!r}")
-        return read_table(source), None
+        return read_cases(source, stimulus), None
     study = load_study(source / "study.toml")
     if not isinstance(study, InjuryStudy):
         raise UserError(f"{source}: is not the folder of an injury study")
-    table = read_table(source / CASES)
+    table = read_parquet(source / CASES)
     wanted = scenario or REFERENCE
     if wanted not in set(table["scenario"]):
         names = ", ".join(map(str, table["scenario"].unique()))
@@ -174,6 +174,20 @@ def tables(analysis: Mapping[str, Any]) -> list[Table]:
     ]
 
 
+def _weighting(analysis: Mapping[str, Any]) -> list[str]:
+    """Return what the weights of the cases mean, if they have any."""
+    if analysis["weight"] is None:
+        return []
+    total = number(analysis["weight"], 6)
+    if analysis["counted"]:
+        return [f"The rows stand for {total} cases by their column 'weight', all counted."]
+    return [
+        f"The rows are weighted by their column 'weight' (sum {total}). The weights are no whole "
+        "numbers and count as shares of a population: the intervals come from the scatter of the "
+        "rows (sandwich), and the AIC, of the weighted likelihood, only compares the families."
+    ]
+
+
 def _method(analysis: Mapping[str, Any]) -> list[str]:
     exact = analysis["exact"]
     lines = [
@@ -182,6 +196,7 @@ def _method(analysis: Mapping[str, Any]) -> list[str]:
         "log-logistic curves by greatest likelihood, the one with the smallest AIC is drawn. With "
         "few cases the AIC hardly tells the families apart: see how far their medians lie from "
         "each other.",
+        *_weighting(analysis),
         "The band is normal on the scale of the linear predictor. The quality index is the width "
         "of the 95 % interval of the stimulus over the stimulus: up to 0.5 good, 1 fair, 1.5 "
         "marginal, above unacceptable.",

@@ -1,6 +1,8 @@
 """Tables of cases: one row a case, its stimulus and whether it was injured."""
 
+import numbers
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -8,22 +10,67 @@ from numpy.typing import NDArray
 
 from mcstudy.errors import UserError
 from mcstudy.injury.observations import Observations, check, observe
+from mcstudy.tables import read_csv
 
+Array = NDArray[np.float64]
+
+INJURED, EXACT, LEVEL, WEIGHT = "injured", "exact", "ais", "weight"
+"""Columns beside the stimulus."""
 _YES, _NO = ("1", "1.0", "true", "yes"), ("0", "0.0", "false", "no")
+_MISSING = ("na", "n/a", "nan", "null", "none", "<na>")
+"""Words of other programs for an empty field."""
 
 
-def read_table(path: Path) -> pd.DataFrame:
+def read_cases(path: Path, stimulus: str) -> pd.DataFrame:
     """Read a table of cases, CSV or Parquet.
+
+    Parameters
+    ----------
+    path : of the table. stimulus : column that the risk depends on.
+
+    Returns
+    -------
+    DataFrame
+        All columns; of a CSV the stimulus, its bounds, AIS and weight as numbers, the rest as text.
 
     Raises
     ------
     UserError
-        If the file cannot be read.
+        If the file cannot be read, or holds something that is no number where one must be; the
+        message names the line.
+    """
+    if path.suffix == ".parquet":
+        return read_parquet(path)
+    table = read_csv(path, text=(INJURED, EXACT))
+    measured = {stimulus, f"{stimulus}_low", f"{stimulus}_high", LEVEL, WEIGHT}
+    return pd.DataFrame(
+        {
+            name: table.numbers(name, missing=_MISSING, infinite=True)
+            if name in measured
+            else fields
+            for name, fields in table.columns.items()
+        }
+    )
+
+
+def read_parquet(path: Path) -> pd.DataFrame:
+    """Read a Parquet table.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read or names a column twice.
     """
     try:
-        return pd.read_parquet(path) if path.suffix == ".parquet" else pd.read_csv(path)
-    except (OSError, ValueError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: cannot be read ({' '.join(str(error).split())[:200]})") from None
+        table = pd.read_parquet(path)
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read ({error})") from None
+    except Exception as error:
+        # What the library raises for a damaged file is of no one kind.
+        raise UserError(f"{path}: is no Parquet table ({str(error)[:200]})") from None
+    if table.columns.duplicated().any():
+        raise UserError(f"{path}: names a column twice")
+    return table
 
 
 def observations_of(table: pd.DataFrame, stimulus: str, level: int, source: str) -> Observations:
@@ -33,7 +80,8 @@ def observations_of(table: pd.DataFrame, stimulus: str, level: int, source: str)
     ----------
     table : with either a column ``stimulus`` and ``injured`` (0 or 1) or ``ais``, and where wanted
         ``exact`` (1 where the stimulus of injury was measured); or columns ``<stimulus>_low`` and
-        ``<stimulus>_high`` (empty: open).
+        ``<stimulus>_high`` (empty or infinite: open). ``weight`` tells how many cases a row stands
+        for.
     stimulus : column. level : AIS that counts as injured where the table has ``ais``.
     source : name for messages.
 
@@ -43,52 +91,75 @@ def observations_of(table: pd.DataFrame, stimulus: str, level: int, source: str)
         If a column is missing or wrong, or the cases allow no risk curve.
     """
     try:
+        weight = _numbers(table, WEIGHT) if WEIGHT in table.columns else None
         if {f"{stimulus}_low", f"{stimulus}_high"} <= set(table.columns):
             low, high = (_numbers(table, f"{stimulus}_{side}") for side in ("low", "high"))
+            # Other programs write a case without a bound as infinite.
+            open_below = np.isnan(low) | (low == -np.inf)
             return check(
-                Observations(np.nan_to_num(low, nan=0.0), np.where(np.isnan(high), np.inf, high))
+                Observations(
+                    np.where(open_below, 0.0, low), np.where(np.isnan(high), np.inf, high), weight
+                )
             )
         values = _numbers(table, stimulus)
-        if "injured" in table.columns:
-            injured = _flags(table, "injured")
-        elif "ais" in table.columns:
+        if INJURED in table.columns:
+            injured = _flags(table, INJURED)
+        elif LEVEL in table.columns:
             injured = _levels(table) >= level
         else:
-            raise ValueError("has neither a column 'injured' nor 'ais'")
-        return observe(
-            values, injured, _flags(table, "exact") if "exact" in table.columns else None
-        )
+            raise ValueError(f"has neither a column {INJURED!r} nor {LEVEL!r}")
+        exact = _flags(table, EXACT, empty=True) if EXACT in table.columns else None
+        return observe(values, injured, exact, weight)
     except ValueError as error:
         raise UserError(f"{source}: {error}") from None
 
 
-def _numbers(table: pd.DataFrame, column: str) -> NDArray[np.float64]:
-    if column not in table.columns:
-        raise ValueError(f"has no column {column!r}; it has {', '.join(map(str, table.columns))}")
-    values = pd.to_numeric(table[column], errors="coerce").to_numpy(dtype=float)
-    given = table[column].notna().to_numpy()
-    wrong = np.flatnonzero(given & np.isnan(values))
-    if wrong.size:
-        shown = str(table[column].iloc[int(wrong[0])])[:40]
-        raise ValueError(f"column {column!r}, case {wrong[0] + 1}: {shown!r} is no number")
-    return values
+def _numbers(table: pd.DataFrame, name: str) -> Array:
+    """Return a column as numbers, NaN where nothing is."""
+    if name not in table.columns:
+        raise ValueError(f"has no column {name!r}; it has {', '.join(map(str, table.columns))}")
+    found = np.full(len(table), np.nan)
+    for k, value in enumerate(table[name]):
+        number = _number(value)
+        if number is None:
+            raise ValueError(f"column {name!r}, case {k + 1}: {str(value)[:40]!r} is no number")
+        found[k] = number
+    return found
 
 
-def _levels(table: pd.DataFrame) -> NDArray[np.float64]:
-    values = _numbers(table, "ais")
+def _number(value: Any) -> float | None:
+    """Return a number, NaN for nothing, None for what is neither."""
+    if value is None or value is pd.NA or value is pd.NaT:
+        return np.nan
+    if isinstance(value, bool | np.bool_):
+        return None
+    if isinstance(value, str) and value.strip().lower() in ("", *_MISSING):
+        return np.nan
+    if not isinstance(value, str | numbers.Real):
+        return None
+    try:
+        return float(value)
+    except (ValueError, OverflowError):
+        return None
+
+
+def _levels(table: pd.DataFrame) -> Array:
+    values = _numbers(table, LEVEL)
     wrong = np.flatnonzero(~np.isin(values, range(7)))
     if wrong.size:
         raise ValueError(
-            f"column 'ais', case {wrong[0] + 1}: must be 0 to 6, given {values[wrong[0]]:g}; leave "
-            "out cases of unknown severity"
+            f"column {LEVEL!r}, case {wrong[0] + 1}: must be 0 to 6, given {values[wrong[0]]:g}; "
+            "leave out cases of unknown severity"
         )
     return values
 
 
-def _flags(table: pd.DataFrame, column: str) -> NDArray[np.bool_]:
-    words = table[column].astype(str).str.strip().str.lower()
-    wrong = np.flatnonzero(~words.isin(_YES + _NO))
+def _flags(table: pd.DataFrame, name: str, *, empty: bool = False) -> NDArray[np.bool_]:
+    """Return which cases say yes; with ``empty``, one that says nothing says no."""
+    words = table[name].astype(str).str.strip().str.lower()
+    allowed = [*_YES, *_NO, *(("", *_MISSING) if empty else ())]
+    wrong = np.flatnonzero(~words.isin(allowed))
     if wrong.size:
-        shown = str(table[column].iloc[int(wrong[0])])[:40]
-        raise ValueError(f"column {column!r}, case {wrong[0] + 1}: {shown!r} is neither 0 nor 1")
+        shown = str(table[name].iloc[int(wrong[0])])[:40]
+        raise ValueError(f"column {name!r}, case {wrong[0] + 1}: {shown!r} is neither 0 nor 1")
     return words.isin(_YES).to_numpy()

@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+SMALLEST, LARGEST = 1e-100, 1e100
+"""Stimuli beyond which a number is taken for a mistake (assumed)."""
+
 
 @dataclass(frozen=True)
 class Observations:
@@ -23,15 +26,27 @@ class Observations:
     ----------
     low, high : (n,) bounds; ``low`` 0 for left-censored, ``high`` infinite for right-censored,
         equal for exact cases.
+    weight : (n,) how many cases each row stands for; None if each is one.
     """
 
     low: Array
     high: Array
+    weight: Array | None = None
 
     @property
     def size(self) -> int:
-        """Number of cases."""
+        """Number of rows."""
         return int(self.low.size)
+
+    @property
+    def weights(self) -> Array:
+        """How many cases each row stands for."""
+        return np.ones(self.size) if self.weight is None else self.weight
+
+    @property
+    def counted(self) -> bool:
+        """Whether the weights are whole numbers of cases, not shares of a population."""
+        return bool(np.all(self.weights == np.round(self.weights)))
 
     @property
     def exact(self) -> Flags:
@@ -50,17 +65,21 @@ class Observations:
         return np.where(self.low == 0.0, self.high, middle)
 
     def without(self, index: int) -> "Observations":
-        """Return the observations without one case."""
-        return Observations(np.delete(self.low, index), np.delete(self.high, index))
+        """Return the observations without one row."""
+        weight = None if self.weight is None else np.delete(self.weight, index)
+        return Observations(np.delete(self.low, index), np.delete(self.high, index), weight)
 
 
-def observe(stimulus: Array, injured: Flags, exact: Flags | None = None) -> Observations:
+def observe(
+    stimulus: Array, injured: Flags, exact: Flags | None = None, weight: Array | None = None
+) -> Observations:
     """Return observations of cases with one stimulus each.
 
     Parameters
     ----------
     stimulus : (n,) positive. injured : (n,).
     exact : (n,) injured cases whose stimulus of injury was measured; by default none.
+    weight : (n,) how many cases each row stands for; by default one.
 
     Raises
     ------
@@ -75,7 +94,7 @@ def observe(stimulus: Array, injured: Flags, exact: Flags | None = None) -> Obse
         raise ValueError(f"case {case + 1} is exact and not injured")
     low = np.where(injured & ~known, 0.0, stimulus)
     high = np.where(injured, stimulus, np.inf)
-    return check(Observations(low, high))
+    return check(Observations(low, high, weight))
 
 
 def check(observations: Observations) -> Observations:
@@ -87,7 +106,7 @@ def check(observations: Observations) -> Observations:
         If a stimulus is not a positive number, an interval is empty or open on both sides, there is
         nothing but one class, or one stimulus fits all cases.
     """
-    low, high = observations.low, observations.high
+    low, high, weights = observations.low, observations.high, observations.weights
     for k in range(observations.size):
         # The open side of a censored case is no measurement.
         bounds = [b for b, open_side in ((low[k], 0.0), (high[k], np.inf)) if b != open_side]
@@ -95,13 +114,17 @@ def check(observations: Observations) -> Observations:
             raise ValueError(
                 f"case {k + 1}: the stimulus must be a positive number, neither bound is one"
             )
-        if not all(np.isfinite(b) and b > 0.0 for b in bounds):
+        if not all(SMALLEST <= b <= LARGEST for b in bounds):
             raise ValueError(
                 f"case {k + 1}: the stimulus must be a positive number, given "
                 f"{', '.join(f'{b:g}' for b in bounds)}"
             )
         if high[k] < low[k]:
             raise ValueError(f"case {k + 1}: the interval {low[k]:g} to {high[k]:g} is empty")
+        if not SMALLEST <= weights[k] <= LARGEST:
+            raise ValueError(
+                f"case {k + 1}: the weight must be a positive number, given {weights[k]:g}"
+            )
     if observations.size < 3:
         raise ValueError(f"{observations.size} cases are too few for a risk curve")
     if np.all(low == 0.0):

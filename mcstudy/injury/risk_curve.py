@@ -38,7 +38,7 @@ def describe_risk(observations: Observations) -> dict[str, Any]:
     ValueError
         If the observations allow no curve.
     """
-    fits = sorted((fit_risk_curve(observations, name) for name in FAMILIES), key=lambda f: f.aic)
+    fits = _fit_families(observations)
     best = fits[0]
     held = observations.stimulus
     grid = np.linspace(0.0, 1.05 * float(held.max()), GRID + 1)[1:]
@@ -47,6 +47,8 @@ def describe_risk(observations: Observations) -> dict[str, Any]:
     x, risk = steps.steps()
     return {
         "cases": observations.size,
+        "weight": None if observations.weight is None else float(observations.weights.sum()),
+        "counted": observations.counted,
         "injured": int(observations.injured.sum()),
         "exact": int(observations.exact.sum()),
         "family": best.family,
@@ -57,6 +59,19 @@ def describe_risk(observations: Observations) -> dict[str, Any]:
         "rug": {"stimulus": held, "injured": observations.injured},
         "influence": _influence(observations, best),
     }
+
+
+def _fit_families(observations: Observations) -> list[RiskFit]:
+    """Return the curves of the families that the observations allow, best first."""
+    fits, refusal = [], None
+    for family in FAMILIES:
+        try:
+            fits.append(fit_risk_curve(observations, family))
+        except ValueError as error:
+            refusal = error
+    if not fits and refusal is not None:
+        raise refusal
+    return sorted(fits, key=lambda fit: fit.aic)
 
 
 def _parameters(fit: RiskFit) -> dict[str, float]:
@@ -86,7 +101,7 @@ def _influence(observations: Observations, fit: RiskFit) -> dict[str, Any] | Non
     """
     if observations.size > MOST_REFITTED:
         return None
-    before = np.log([fit.stimulus_at(p)[0] for p in QUALITY_AT])
+    before = np.array([fit.log_stimulus_at(p)[0] for p in QUALITY_AT])
     shifts = np.full(observations.size, np.inf)
     for k in range(observations.size):
         try:
@@ -94,8 +109,8 @@ def _influence(observations: Observations, fit: RiskFit) -> dict[str, Any] | Non
         except ValueError:
             # Without this case there is no curve at all.
             continue
-        centre, low, high = np.log([refitted.stimulus_at(p) for p in QUALITY_AT]).T
-        moved = (centre - before) / ((high - low) / (2.0 * REACH))
+        centre, reach = np.transpose([refitted.log_stimulus_at(p) for p in QUALITY_AT])
+        moved = (centre - before) / (reach / REACH)
         shifts[k] = moved[np.argmax(np.abs(moved))]
     order = np.argsort(-np.abs(shifts))[:INFLUENCE_SHOWN]
     return {

@@ -10,6 +10,11 @@ An interval contributes ln(F(high) - F(low)) to the likelihood, an exact case th
 of it is concave in intercept and slope, so Newton's method finds the one maximum; for data that are
 only left- and right-censored it is that of a probit, logit or complementary log-log regression on
 ln x.
+
+Rows may have weights. Whole numbers count equal cases, and give what the cases would give one by
+one. Others are shares of a population (survey weights): the curve is that of the weighted
+likelihood, its covariance the sandwich H^-1 (sum w^2 g g') H^-1 of the rows' gradients g (H. White,
+Econometrica 50, 1982), which does not depend on what the weights add up to.
 """
 
 from dataclasses import dataclass
@@ -37,7 +42,8 @@ class RiskFit:
     Attributes
     ----------
     family : one of ``FAMILIES``. intercept, slope : of z in ln x.
-    covariance : (2, 2) of intercept and slope. log_likelihood : float. cases : number.
+    covariance : (2, 2) of intercept and slope. log_likelihood : float, weighted.
+    cases : number of rows.
     """
 
     family: str
@@ -64,16 +70,19 @@ class RiskFit:
         reach = REACH * np.sqrt(c[0, 0] + 2.0 * c[0, 1] * y + c[1, 1] * y * y)
         return _risk(self.family, z - reach), _risk(self.family, z + reach)
 
-    def stimulus_at(self, risk: float) -> tuple[float, float, float]:
-        """Return the stimulus of a risk with its 95 % interval, normal in ln x."""
+    def log_stimulus_at(self, risk: float) -> tuple[float, float]:
+        """Return ln x of a risk and half its 95 % interval."""
         centre = (_score(self.family, risk) - self.intercept) / self.slope
         gradient = np.array([1.0, centre]) / self.slope
-        reach = REACH * float(np.sqrt(gradient @ self.covariance @ gradient))
-        return (
-            float(np.exp(centre)),
-            float(np.exp(centre - reach)),
-            float(np.exp(centre + reach)),
-        )
+        return centre, REACH * float(np.sqrt(gradient @ self.covariance @ gradient))
+
+    def stimulus_at(self, risk: float) -> tuple[float, float, float]:
+        """Return the stimulus of a risk with its 95 % interval, normal in ln x."""
+        centre, reach = self.log_stimulus_at(risk)
+        with np.errstate(over="ignore"):
+            # Of a curve that hardly rises the interval has no end that a number can hold.
+            value, low, high = np.exp([centre, centre - reach, centre + reach]).tolist()
+        return value, low, high
 
     def quality_index(self, risk: float) -> float:
         """Return the width of the stimulus's interval over the stimulus (ISO/TS 18506)."""
@@ -104,54 +113,88 @@ def fit_risk_curve(observations: Observations, family: str) -> RiskFit:
     check(observations)
     with np.errstate(divide="ignore"):
         low, high = np.log(observations.low), np.log(observations.high)
-    exact = observations.exact
+    exact, weights = observations.exact, observations.weights
     y = np.log(observations.stimulus)
     middle, width = float(y.mean()), float(y.std()) or 1.0
 
-    # Centred and scaled, so that the two parameters hardly depend on each other.
-    low, high = (low - middle) / width, (high - middle) / width
+    # Centred and scaled, so that the two parameters hardly depend on each other; the weights to a
+    # mean of one, so that the search ends at the same place whatever they count.
+    cases = _Cases((low - middle) / width, (high - middle) / width, exact,
+                   weights / weights.mean())  # fmt: skip
 
     def loss(p: Array) -> tuple[float, Array]:
-        total, gradient, _ = _likelihood(family, p, low, high, exact)
-        return -total, -gradient
+        total, gradient, _ = _likelihood(family, p, cases)
+        return -total, -gradient.sum(axis=1)
 
     def curvature(p: Array) -> Array:
-        return -_likelihood(family, p, low, high, exact)[2]
+        return -_likelihood(family, p, cases)[2]
 
-    start: Array = np.array([_score(family, float(observations.injured.mean())), 1.0])
+    # At the middle of the stimuli the share of the injured, kept from 0 and 1, is a start of
+    # finite likelihood whatever the censoring.
+    share = float(observations.injured.mean())
+    rim = 0.5 / observations.size
+    start: Array = np.array([_score(family, min(max(share, rim), 1.0 - rim)), 1.0])
     found = optimize.minimize(loss, start, method="trust-exact", jac=True, hess=curvature, tol=1e-9)
     best = np.asarray(found.x)
-    total = _likelihood(family, best, low, high, exact)[0]
+    total, gradient, hessian = _likelihood(family, best, cases)
     if not (np.isfinite(total) and best[1] > 0.0):
         raise ValueError("risk does not rise with the stimulus: no curve is given")
+    try:
+        inverse = np.linalg.inv(-hessian)
+    except np.linalg.LinAlgError:
+        inverse = np.full((2, 2), np.nan)
+    if not (np.all(np.isfinite(inverse)) and np.all(np.diag(inverse) > 0.0)):
+        raise ValueError("the cases do not tell where and how fast risk rises: no curve is given")
+    scaled = inverse if observations.counted else inverse @ (gradient @ gradient.T) @ inverse
+    if observations.counted:
+        scaled = scaled / weights.mean()
     # Back to ln x: z = a + b (y - middle) / width.
     back = np.array([[1.0, -middle / width], [0.0, 1.0 / width]])
     intercept, slope = back @ best
-    covariance = back @ np.linalg.inv(curvature(best)) @ back.T
     # The density of an exact case is one in x, not in the scaled ln x.
-    total -= float(exact.sum()) * np.log(width) + float(np.log(observations.high[exact]).sum())
-    return RiskFit(family, float(intercept), float(slope), covariance, total, observations.size)
+    total *= weights.mean()
+    total -= float(weights[exact] @ (np.log(width) + np.log(observations.high[exact])))
+    return RiskFit(
+        family, float(intercept), float(slope), back @ scaled @ back.T, total, observations.size
+    )
 
 
-def _likelihood(
-    family: str, parameters: Array, low: Array, high: Array, exact: NDArray[np.bool_]
-) -> tuple[float, Array, Array]:
-    """Return log likelihood, gradient (2,) and Hessian (2, 2) in intercept and slope."""
+@dataclass(frozen=True)
+class _Cases:
+    """Bounds (n,) in scaled ln x, which are exact (n,), weights (n,)."""
+
+    low: Array
+    high: Array
+    exact: NDArray[np.bool_]
+    weight: Array
+
+
+def _likelihood(family: str, parameters: Array, cases: _Cases) -> tuple[float, Array, Array]:
+    """Return log likelihood, its gradient by case (2, n) and Hessian (2, 2), all weighted.
+
+    Both are in intercept and slope.
+    """
     a, b = parameters
+    exact, weight = cases.exact, cases.weight
+    gradient, hessian = np.zeros((2, exact.size)), np.zeros((2, 2))
     if exact.any() and b <= 0.0:
-        return -np.inf, np.zeros(2), -np.eye(2)
-    gradient, hessian = np.zeros(2), np.zeros((2, 2))
+        return -np.inf, gradient, -np.eye(2)
     total = 0.0
     if exact.any():
-        y = high[exact]
+        y, w = cases.high[exact], weight[exact]
         log_density, first, second = _density(family, a + b * y)
         rows = np.stack([np.ones_like(y), y])
-        total += float(log_density.sum() + y.size * np.log(b))
-        gradient += rows @ first + np.array([0.0, y.size / b])
-        hessian += (rows * second) @ rows.T - np.diag([0.0, y.size / b**2])
-    y1, y2 = low[~exact], high[~exact]
+        total += float(w @ log_density + w.sum() * np.log(b))
+        gradient[:, exact] = w * (rows * first + np.array([[0.0], [1.0 / b]]))
+        hessian += (rows * (w * second)) @ rows.T - np.diag([0.0, w.sum() / b**2])
+    if exact.all():
+        return total, gradient, hessian
+    y1, y2, w = cases.low[~exact], cases.high[~exact], weight[~exact]
     log_share = _log_between(family, y1, y2, a, b)
-    total += float(log_share.sum())
+    total += float(w @ log_share)
+    if not np.isfinite(total):
+        # Outside of what is possible: an interval of no share.
+        return -np.inf, gradient, -np.eye(2)
     sides = []
     for y in (y1, y2):
         finite = np.isfinite(y)
@@ -160,10 +203,11 @@ def _likelihood(
         ratio = np.where(finite, np.exp(log_density - log_share), 0.0)
         sides.append((ratio, ratio * first, np.stack([np.ones_like(held), held])))
     (r1, d1, rows1), (r2, d2, rows2) = sides
-    gradient += rows2 @ r2 - rows1 @ r1
-    cross = (rows1 * (r1 * r2)) @ rows2.T
-    hessian += (rows2 * (d2 - r2**2)) @ rows2.T - (rows1 * (d1 + r1**2)) @ rows1.T + cross + cross.T
-    return total, gradient, hessian
+    gradient[:, ~exact] = w * (rows2 * r2 - rows1 * r1)
+    cross = (rows1 * (w * r1 * r2)) @ rows2.T
+    upper = (rows2 * (w * (d2 - r2**2))) @ rows2.T
+    lower = (rows1 * (w * (d1 + r1**2))) @ rows1.T
+    return total, gradient, hessian + upper - lower + cross + cross.T
 
 
 def _log_between(family: str, y1: Array, y2: Array, a: float, b: float) -> Array:

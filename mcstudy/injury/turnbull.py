@@ -59,23 +59,25 @@ def estimate_steps(observations: Observations) -> StepRisk:
     above = np.where(point, left > low[:, None], left >= low[:, None])
     inside = above & (right <= high[:, None])
     inside[exact] = point & (left == high[exact][:, None])
+    weight = observations.weights / observations.weights.sum()
     share = np.full(left.size, 1.0 / left.size)
     for _ in range(MOST_STEPS):
-        once = _redistribute(inside, share)
-        twice = _redistribute(inside, once)
+        once = _redistribute(inside, weight, share)
+        twice = _redistribute(inside, weight, once)
         if float(np.max(np.abs(twice - once))) < TOLERANCE:
             return StepRisk(left, right, twice)
-        share = _extrapolate(inside, share, once, twice)
+        share = _extrapolate(inside, weight, share, once, twice)
     return StepRisk(left, right, share)
 
 
-def _redistribute(inside: NDArray[np.bool_], share: Array) -> Array:
+def _redistribute(inside: NDArray[np.bool_], weight: Array, share: Array) -> Array:
     """Return the shares that cases give to the intervals within their bounds."""
-    total = inside @ share
-    return np.asarray(share * (inside.T @ (1.0 / total)) / total.size)
+    return np.asarray(share * (inside.T @ (weight / (inside @ share))))
 
 
-def _extrapolate(inside: NDArray[np.bool_], share: Array, once: Array, twice: Array) -> Array:
+def _extrapolate(
+    inside: NDArray[np.bool_], weight: Array, share: Array, once: Array, twice: Array
+) -> Array:
     """Return where two steps of self-consistency lead, or the second where that is less likely.
 
     Squared extrapolation of R. Varadhan and C. Roland, Scandinavian Journal of Statistics 35, 2008.
@@ -88,7 +90,7 @@ def _extrapolate(inside: NDArray[np.bool_], share: Array, once: Array, twice: Ar
     far = np.maximum(share + 2.0 * length * step + length**2 * bend, 0.0)
     far /= far.sum()
     held = inside @ far
-    if held.min() > 0.0 and np.log(held).sum() >= np.log(inside @ twice).sum():
+    if held.min() > 0.0 and weight @ np.log(held) >= weight @ np.log(inside @ twice):
         return far
     return twice
 
@@ -97,7 +99,13 @@ def _isotonic(observations: Observations) -> StepRisk:
     """Return the estimate of cases that are only left- or right-censored, in one pass."""
     order = np.lexsort((~observations.injured, observations.stimulus))
     x = observations.stimulus[order]
-    risk = np.clip(optimize.isotonic_regression(observations.injured[order].astype(float)).x, 0, 1)
+    risk = np.clip(
+        optimize.isotonic_regression(
+            observations.injured[order].astype(float), weights=observations.weights[order]
+        ).x,
+        0,
+        1,
+    )
     rises = np.flatnonzero(np.diff(risk, prepend=0.0) > 0.0)
     below = np.where(rises > 0, x[rises - 1], 0.0)
     low, high = np.append(below, x[-1]), np.append(x[rises], np.inf)

@@ -14,7 +14,7 @@ import numpy as np
 from mcstudy.config import InjuryStudy, parse_study
 from mcstudy.figures import diagnosis as figures_of
 from mcstudy.figures import risk, style
-from mcstudy.injury.cases import read_table
+from mcstudy.injury.cases import read_parquet
 from mcstudy.progress import say
 from mcstudy.report import Section, Table
 from mcstudy.results import ResultsFolder
@@ -88,7 +88,7 @@ def _draw(analysis: Mapping[str, Any], out: Path) -> dict[str, Any]:
         "ais": risk.draw_ais({TITLES[k]: v["ais"] for k, v in analysis["injuries"].items()}),
     }
     values = {
-        TITLES[name]: read_table(out / f"injury_{name}" / CASES)["hic15"].to_numpy(float)
+        TITLES[name]: read_parquet(out / f"injury_{name}" / CASES)["hic15"].to_numpy(float)
         for name in TITLES
     }
     limit = analysis["injuries"]["base"]["limit"]

@@ -158,6 +158,46 @@ def test_columns_in_any_order_and_windows_files(tmp_path: Path) -> None:
     assert list(data.tests["test"]) == ["A-1", "B.2"]
 
 
+@pytest.mark.parametrize(
+    ("text", "encoding"),
+    [
+        (TESTS, "utf-16"),
+        (TESTS.replace(",", ";"), "utf-8"),
+        (TESTS.replace(",", ";").replace("30", "30,0"), "utf-8"),
+        (TESTS.replace(",", "\t"), "utf-8-sig"),
+        (TESTS.replace(",", " , "), "utf-8"),
+        ("sep=;\n" + TESTS.replace(",", ";"), "utf-8"),
+        (TESTS.replace("remark", "Prüfer"), "cp1252"),
+        (TESTS.replace("\n", "\r"), "utf-8"),
+    ],
+)
+def test_tables_as_programs_write_them(tmp_path: Path, text: str, encoding: str) -> None:
+    data = load(tmp_path, **{"tests.csv": text.encode(encoding)})
+    assert list(data.tests["test"]) == ["A-1", "B.2"]
+    assert data.input_value("impact_speed", 0, "km/h") == pytest.approx((30.0, 0.18))
+    assert data.tests["hic15"].iloc[0] == 800.0
+
+
+def test_a_study_file_with_a_byte_order_mark(tmp_path: Path) -> None:
+    data = load(tmp_path, **{"measured.toml": b"\xef\xbb\xbf" + HEADER.encode()})
+    assert data.header.title.startswith("Hood B")
+
+
+def test_places_of_errors_stand_in_the_file(tmp_path: Path) -> None:
+    # The distribution is one of several classes; its name is no key of the file.
+    with pytest.raises(UserError, match=r"toml: uncertain\.hood_force_scale\.sigma: ") as caught:
+        load(tmp_path, **changed("measured.toml", "sigma = 0.06", "sigma = '1'"))
+    assert "lognormal" not in str(caught.value)
+    with pytest.raises(UserError, match=r"toml: fixed\.hood_curve: must be a number or a list"):
+        load(tmp_path, **changed("measured.toml", "0.015, 2600.0", "0.015, 'x'"))
+
+
+@pytest.mark.parametrize("unit", ["Km/h", "KM/H", "kph", "km/hr"])
+def test_units_in_other_letters(tmp_path: Path, unit: str) -> None:
+    data = load(tmp_path, **changed("measured.toml", 'unit = "km/h"', f'unit = "{unit}"'))
+    assert data.header.inputs["impact_speed"].unit == "km/h"
+
+
 def test_numbers_as_ids_stay_text(tmp_path: Path) -> None:
     files = {"tests.csv": TESTS.replace("A-1", "007").replace("B.2", "1e3")}
     signal = FILES["signals/A-1.csv"]
@@ -186,7 +226,7 @@ DAMAGE: dict[str, tuple[dict[str, Any], str]] = {
     "header empty": ({"measured.toml": ""}, "measured.toml: "),
     "header cut": ({"measured.toml": HEADER[:200]}, "measured.toml: "),
     "header binary": ({"measured.toml": BINARY}, "measured.toml: cannot be read"),
-    "header nested": ({"measured.toml": "a = " + "[" * 5000}, "measured.toml: cannot be read"),
+    "header nested": ({"measured.toml": "a = " + "[" * 5000}, "measured.toml: not valid TOML"),
     "other format": (changed("measured.toml", "measured/1", "measured/2"), "measured.toml: format"),
     "no model": (changed("measured.toml", 'model = "headform"', ""), "measured.toml: model"),
     "unknown key": ({"measured.toml": "colour = 3\n" + HEADER}, "measured.toml: colour"),
@@ -203,12 +243,10 @@ DAMAGE: dict[str, tuple[dict[str, Any], str]] = {
                                "title = 3"), "measured.toml: title"),
     "tests empty": ({"tests.csv": ""}, "tests.csv: line 1 must name"),
     "tests binary": ({"tests.csv": BINARY}, "tests.csv: cannot be read"),
-    "tests utf-16": ({"tests.csv": TESTS.encode("utf-16")}, "tests.csv: cannot be read"),
     "tests cut": ({"tests.csv": TESTS.splitlines()[0]}, "tests.csv: holds no tests"),
     "row cut": ({"tests.csv": TESTS[:-9]}, "tests.csv: line 3 has 1 fields, not 5"),
     "open quote": (changed("tests.csv", "A-1", '"A-1'), "tests.csv: cannot be read"),
-    "semicolons": ({"tests.csv": TESTS.replace(",", ";")}, "tests.csv: "),
-    "no id column": (changed("tests.csv", "test,", "id,"), "tests.csv: line 2: column "),
+    "no id column": (changed("tests.csv", "test,", "id,"), "tests.csv: column 'test' is missing"),
     "no input column": (changed("tests.csv", "impact_speed", "speed"), "column 'impact_speed'"),
     "no scalar column": (changed("tests.csv", "hic15", "hic"), "column 'hic15' is missing"),
     "nan input": (changed("tests.csv", "A-1,30", "A-1,nan"), "column 'impact_speed' must"),
@@ -223,9 +261,8 @@ DAMAGE: dict[str, tuple[dict[str, Any], str]] = {
     "absolute path": (changed("tests.csv", "A-1", "/etc/passwd"), "cannot name a file"),
     "windows path": (changed("tests.csv", "A-1", "C:A-1"), "cannot name a file"),
     "hidden file": (changed("tests.csv", "A-1", ".A-1"), "cannot name a file"),
-    "blank in id": (changed("tests.csv", "A-1", " A-1"), "cannot name a file"),
     "line break in id": (changed("tests.csv", "A-1", '"A\n1"'), "cannot name a file"),
-    "null in id": (changed("tests.csv", "A-1", "A\0-1"), "cannot name a file"),
+    "null in id": (changed("tests.csv", "A-1", "A\0-1"), "cannot be read"),
     "long id": (changed("tests.csv", "A-1", "x" * 5000), "cannot name a file"),
     "signal empty": ({SIGNAL: ""}, "A-1.csv: line 1 must name"),
     "signal header only": ({SIGNAL: NUMBERS[:34]}, "A-1.csv: line .* ends after 0 samples"),

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from mcstudy.errors import UserError
-from mcstudy.injury.cases import observations_of, read_table
+from mcstudy.injury.cases import observations_of, read_cases
 from mcstudy.injury.observations import Observations, check, observe
 
 X = np.array([100.0, 200.0, 300.0, 400.0])
@@ -210,26 +210,32 @@ def test_csv_and_parquet_are_read_alike(tmp_path: Path) -> None:
     held.to_csv(tmp_path / "cases.csv", index=False)
     held.to_parquet(tmp_path / "cases.parquet")
     for name in ("cases.csv", "cases.parquet"):
-        pd.testing.assert_frame_equal(read_table(tmp_path / name), held)
+        pd.testing.assert_frame_equal(
+            read_cases(tmp_path / name, "hic15")[["hic15"]], held[["hic15"]]
+        )
 
 
 def test_files_that_cannot_be_read_are_the_users(tmp_path: Path) -> None:
     (tmp_path / "empty.csv").write_text("", encoding="utf-8")
     (tmp_path / "torn.parquet").write_bytes(b"PAR1 torn")
-    (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\x81")
-    for name in ("missing.csv", "empty.csv", "torn.parquet", "binary.csv", "missing.parquet"):
-        with pytest.raises(UserError, match=rf"{name}: cannot be read"):
-            read_table(tmp_path / name)
+    (tmp_path / "binary.csv").write_bytes(b"\x01\x00\x81")
+    for name, message in {
+        "missing.csv": "cannot be read", "empty.csv": "line 1 must name the columns",
+        "torn.parquet": "is no Parquet table", "binary.csv": "cannot be read",
+        "missing.parquet": "cannot be read",
+    }.items():  # fmt: skip
+        with pytest.raises(UserError, match=rf"{name}: {message}"):
+            read_cases(tmp_path / name, "f")
 
 
 def test_a_folder_is_no_table(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="cannot be read"):
-        read_table(tmp_path)
+        read_cases(tmp_path, "f")
 
 
 def test_a_csv_from_a_spreadsheet_is_read_with_empty_bounds(tmp_path: Path) -> None:
     path = tmp_path / "bounds.csv"
     path.write_text("f_low,f_high\n100,\n,200\n300,400\n", encoding="utf-8")
-    found = observations_of(read_table(path), "f", 3, "bounds.csv")
+    found = observations_of(read_cases(path, "f"), "f", 3, "bounds.csv")
     np.testing.assert_array_equal(found.low, [100.0, 0.0, 300.0])
     np.testing.assert_array_equal(found.high, [OPEN, 200.0, 400.0])

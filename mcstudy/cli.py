@@ -11,11 +11,9 @@ from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
-from rich.console import Console
-from rich.table import Table as RichTable
-from rich.text import Text
 
-from mcstudy.errors import StudyError, UserError
+from mcstudy.errors import StudyError, UserError, on_one_line
+from mcstudy.terminal import accept_any_text, print_lines, print_path, print_table
 
 app = typer.Typer(
     help="Monte Carlo uncertainty and injury-risk studies of crash simulations.",
@@ -47,6 +45,13 @@ Workers = Annotated[
 Cluster = Annotated[
     str | None,
     typer.Option(help="Address of a dask scheduler (tcp://...), or local, in place of --workers."),
+]
+Channel = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Of ISO-MME tests: code or file of the head channels to take, with ? and * for any "
+        "characters; may be repeated."
+    ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print no progress and no summary.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
@@ -80,11 +85,11 @@ def reconstruct(study: Study, out: Out = None, quiet: Quiet = False, as_json: Js
     if as_json:
         _print_json(dict(case.outputs) | {"status": case.status})
     elif not quiet:
-        console = Console()
         for comparison in tables:
-            _print_table(console, reconstruction.as_table(comparison))
-        console.print(f"ended: {case.end_reason.replace('_', ' ')}")
-        console.print(f"report: {folder.path / 'report.html'}", soft_wrap=True)
+            table = reconstruction.as_table(comparison)
+            print_table(table.caption, table.head, table.rows)
+        print_lines([f"ended: {case.end_reason.replace('_', ' ')}"])
+        print_path("report", folder.path / "report.html")
 
 
 @app.command()
@@ -135,6 +140,7 @@ def fit_stiffness(
         str, typer.Option(help="How the corridor is built: quantiles or components.")
     ] = "quantiles",
     knots: Annotated[int, typer.Option(help="Most knots of a loading curve, 2 to 8.")] = 6,
+    channel: Channel = None,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -144,14 +150,11 @@ def fit_stiffness(
 
     folder = ResultsFolder(out or Path("results") / f"stiffness_{data.resolve().name}")
     analysis = stiffness.fit_stiffness_of(
-        data, folder, zone=zone, method=method, knots=knots, quiet=quiet or as_json
-    )
-    if as_json:
-        _print_json({"folder": str(folder.path), "analysis": analysis})
-    elif not quiet:
-        console = Console()
-        _print_table(console, stiffness.summary_table(analysis))
-        console.print(f"report: {folder.path / 'report.html'}", soft_wrap=True)
+        data, folder, zone=zone, method=method, knots=knots, channels=channel or (),
+        quiet=quiet or as_json,
+    )  # fmt: skip
+    summary = [stiffness.summary_table(analysis), *analysis["notes"]]
+    _print_analysis(analysis, summary, folder.path, quiet=quiet, as_json=as_json)
 
 
 @app.command("risk-curve")
@@ -191,6 +194,7 @@ def diagnose(
     model_config: Annotated[
         Path | None, typer.Option(help="Study file whose model is diagnosed.")
     ] = None,
+    channel: Channel = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the simulated data sets.")] = 0,
     out: Out = None,
     workers: Workers = -1,
@@ -204,7 +208,7 @@ def diagnose(
 
     folder = ResultsFolder(out or Path("results") / f"diagnosis_{data.resolve().name}")
     answer = diagnosis.diagnose(
-        data, folder, model_config=model_config, seed=seed, workers=workers,
+        data, folder, model_config=model_config, channels=channel or (), seed=seed, workers=workers,
         quiet=quiet or as_json,
     )  # fmt: skip
     summary = [*diagnosis_report.summarise(answer), *diagnosis_report.table_of(answer)]
@@ -245,14 +249,9 @@ def validate(
     analysis = report.validate(
         folder, measured=measured, only=only or (), workers=workers, quiet=quiet or as_json
     )
-    if as_json:
-        _print_json({"folder": str(folder.path), "analysis": analysis})
-    elif not quiet:
-        console = Console()
-        _print_table(console, report.table_of(analysis))
-        counts = ", ".join(f"{n} {word}" for word, n in analysis["counts"].items())
-        console.print(f"{len(analysis['checks'])} checks: {counts}")
-        console.print(f"report: {folder.path / 'report.html'}", soft_wrap=True)
+    counts = ", ".join(f"{n} {word}" for word, n in analysis["counts"].items())
+    summary = [report.table_of(analysis), f"{len(analysis['checks'])} checks: {counts}"]
+    _print_analysis(analysis, summary, folder.path, quiet=quiet, as_json=as_json)
     report.check_exact(analysis)
 
 
@@ -292,13 +291,12 @@ def models(
     if as_json:
         _print_json(described)
         return
-    console = Console()
     for title in ("inputs", "outputs"):
         rows = described[title]
-        table = RichTable(*rows[0], title=title)
-        for row in rows:
-            table.add_row(*(f"{v:.5g}" if isinstance(v, float) else str(v) for v in row.values()))
-        console.print(table)
+        cells = [
+            [f"{v:.5g}" if isinstance(v, float) else str(v) for v in row.values()] for row in rows
+        ]
+        print_table(title, list(rows[0]), cells)
 
 
 @app.command()
@@ -318,24 +316,24 @@ def effects(
             else catalogue.describe_effect(name)
         )
         return
-    console = Console()
     if name is None:
-        table = RichTable("effect", "what it is", "models", "parameters")
-        for row in catalogue.describe_effects():
-            table.add_row(row["name"], row["title"], ", ".join(row["models"]),
-                          ", ".join(p["name"] for p in row["parameters"]))  # fmt: skip
-        console.print(table)
+        rows = [
+            [row["name"], row["title"], ", ".join(row["models"]),
+             ", ".join(p["name"] for p in row["parameters"])]
+            for row in catalogue.describe_effects()
+        ]  # fmt: skip
+        print_table("", ["effect", "what it is", "models", "parameters"], rows)
         return
     described = catalogue.describe_effect(name)
-    console.print(f"{described['name']}: {described['title']}", markup=False)
+    lines = [f"{described['name']}: {described['title']}"]
     for key in ("signature", "confusable", "separated_by", "source"):
         text = described[key] if isinstance(described[key], str) else ", ".join(described[key])
-        console.print(f"{key.replace('_', ' ')}: {text or 'nothing'}", markup=False)
-    table = RichTable("parameter", "unit", "none", "prior", "range", "meaning")
-    for row in described["parameters"]:
-        table.add_row(*(str(row[key]) for key in ("name", "unit", "none", "prior", "range",
-                                                  "meaning")))  # fmt: skip
-    console.print(table)
+        lines.append(f"{key.replace('_', ' ')}: {text or 'nothing'}")
+    print_lines(lines)
+    head = ["parameter", "unit", "none", "prior", "range", "meaning"]
+    keys = ["name", *head[1:]]
+    cells = [[str(row[key]) for key in keys] for row in described["parameters"]]
+    print_table("", head, cells)
 
 
 def _print_analysis(
@@ -346,21 +344,12 @@ def _print_analysis(
         return
     if quiet:
         return
-    console = Console()
     for part in summary:
         if isinstance(part, str):
-            console.print(part, markup=False, highlight=False)
+            print_lines([part])
         else:
-            _print_table(console, part)
-    console.print(f"report: {path / 'report.html'}", soft_wrap=True)
-
-
-def _print_table(console: Console, table: Any) -> None:
-    shown = RichTable(*table.head, title=table.caption)
-    for row in table.rows:
-        # Text, not markup: a label in square brackets is no style.
-        shown.add_row(*(Text(cell) for cell in row))
-    console.print(shown)
+            print_table(part.caption, part.head, part.rows)
+    print_path("report", path / "report.html")
 
 
 def _print_json(content: dict[str, Any]) -> None:
@@ -371,6 +360,7 @@ def _print_json(content: dict[str, Any]) -> None:
 
 def main() -> None:
     """Run the command line and exit."""
+    accept_any_text((sys.stdout, sys.stderr))
     try:
         # Out of standalone mode Typer returns the code of an exit; an interrupt is one with 130.
         code = app(standalone_mode=False)
@@ -399,7 +389,7 @@ def _fail(message: str, code: int) -> NoReturn:
 
 
 def _print_failure(message: str) -> None:
-    print(f"mcstudy: {message}", file=sys.stderr, flush=True)
+    print(f"mcstudy: {on_one_line(message)}", file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ from mcstudy.config import first_problem
 from mcstudy.errors import UserError
 from mcstudy.files import parse_toml, read_study_text
 from mcstudy.inputs import Distribution, Unit
+from mcstudy.sampling_times import regular_times
 from mcstudy.tables import TextTable, read_csv
 
 Array = NDArray[np.float64]
@@ -233,6 +234,7 @@ def _series(path: Path, frame: pd.DataFrame, name: str) -> Array:
     if back.any():
         line = frame.index[given[int(np.argmax(back)) + 1]]
         raise UserError(f"{path}: line {line}: time must rise")
+    table[:, 0] = regular_times(table[:, 0])
     return table
 
 
@@ -263,18 +265,20 @@ def _from_isomme(folder: Path, tests: Sequence[isomme.Test], channels: Sequence[
         speed, mass = test.velocity_of(found.object), test.mass_of(found.object)
         if not (np.isfinite(speed) and np.isfinite(mass)):
             raise UserError(
-                f"{test.name}: 'Velocity test object {found.object}' and 'Mass test object "
+                f"{test.path}: 'Velocity test object {found.object}' and 'Mass test object "
                 f"{found.object}' must be given"
             )
         channel = found.channel
         if channel.time.size < FEWEST_SAMPLES:
             raise UserError(
-                f"{test.name}: {channel.code} holds {channel.time.size} samples, {FEWEST_SAMPLES} "
+                f"{test.path}: {channel.code} holds {channel.time.size} samples, {FEWEST_SAMPLES} "
                 "are needed"
             )
         filters.add(channel.filter)
         rows.append({"test": test.name, "impact_speed": speed, "headform_mass": mass})
-        signals[test.name] = {"head_acceleration": np.stack([channel.time, channel.values], 1)}
+        signals[test.name] = {
+            "head_acceleration": np.stack([regular_times(channel.time), channel.values], 1)
+        }
         notes[test.name] = found.notes
     if len(filters) > 1:
         raise UserError(f"{folder}: head accelerations are filtered differently: {sorted(filters)}")

@@ -83,7 +83,8 @@ class ResultsFolder:
         target = self.path / name
         target.parent.mkdir(parents=True, exist_ok=True)
         with _replacing(target) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+            # A path may hold bytes that are no text.
+            temporary.write_text(text, encoding="utf-8", errors="replace")
 
     def write_json(self, name: str, content: Any) -> None:
         """Write a JSON file at once; NaN becomes null."""

@@ -1,6 +1,6 @@
 """Stiffness from headform tests: a curve per test, the corridor of all, what HIC comes of it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,7 @@ from models.criteria import clip_level, contact_window, filter_cfc, head_injury_
 from models.headform.identification import CHANNEL_CLASS, StiffnessFit, fit_stiffness
 from models.protocol import OK
 from models.registry import load_model
+from studies.headform_records import keep_first_impacts, note_lines
 
 Array = NDArray[np.float64]
 
@@ -93,12 +94,11 @@ def _fit_test(data: Measured, row: int, name: str, knots: int) -> FittedTest:
     time, values = data.signal(name, "head_acceleration", "g")
     header = data.header.signals["head_acceleration"]
     scale = header.sd * units.factor(header.unit, "g")
-    filtered = header.channel_class > 0.0
     fit = fit_stiffness(
-        time, values, speed * np.cos(angle[0]), mass, filtered=filtered, noise=scale,
-        speed_sd=speed_sd, mass_sd=mass_sd, knots=knots, seed=row,
+        time, values, speed * np.cos(angle[0]), mass, channel_class=header.channel_class,
+        noise=scale, speed_sd=speed_sd, mass_sd=mass_sd, knots=knots, seed=row,
     )  # fmt: skip
-    if not filtered:
+    if header.channel_class == 0.0:
         values = filter_cfc(values, 1.0 / float(np.diff(time).mean()), CHANNEL_CLASS)
     values = values - fit.loop.offset
     curve = fit.curve
@@ -164,6 +164,7 @@ def fit_stiffness_of(
     zone: str = "hood",
     method: str = "quantiles",
     knots: int = 6,
+    channels: Sequence[str] = (),
     quiet: bool = False,
 ) -> dict[str, Any]:
     """Fit a folder of tests and write curves, corridor, figures and report.
@@ -175,6 +176,7 @@ def fit_stiffness_of(
     zone : name of the zone in the corridor file.
     method : ``quantiles`` or ``components``, how the corridor is built.
     knots : most knots of a curve.
+    channels : of ISO-MME tests, which to take; see ``mcstudy.isomme.head_acceleration``.
 
     Returns
     -------
@@ -190,7 +192,7 @@ def fit_stiffness_of(
         raise UserError(f"--method must be one of {', '.join(METHODS)}, given {method!r}")
     if not 2 <= knots <= 8:
         raise UserError(f"--knots must lie within 2 and 8, given {knots}")
-    data = load_measured(folder)
+    data = keep_first_impacts(load_measured(folder, channels))
     tests = fit_tests(data, knots=knots, quiet=quiet)
     corridor = None
     if len(tests) >= FEWEST_CURVES:
@@ -213,7 +215,12 @@ def fit_stiffness_of(
 def _analysis(
     data: Measured, tests: list[FittedTest], corridor: Corridor | None, method: str
 ) -> dict[str, Any]:
-    table: dict[str, Any] = {"title": data.header.title, "tests": {}, "corridor": None}
+    table: dict[str, Any] = {
+        "title": data.header.title,
+        "notes": note_lines(data),
+        "tests": {},
+        "corridor": None,
+    }
     for test in tests:
         fit = test.fit
         table["tests"][test.name] = {
@@ -225,7 +232,8 @@ def _analysis(
             "force_high": fit.force_high,
             "unloading_ratio": vars(fit.unloading_ratio),
             "permanent": vars(fit.permanent),
-            "largest_penetration": float(fit.loop.penetration.max()),
+            "largest_penetration": fit.largest.value,
+            "largest_penetration_interval": [fit.largest.low, fit.largest.high],
             "residual": fit.residual,
             "onset": fit.loop.onset,
             "offset": fit.loop.offset,
@@ -301,11 +309,27 @@ def _draw(
     return figures
 
 
+def _filter_words(data: Measured) -> list[str]:
+    """Return how signals of a low channel class were fitted, and what their HIC is worth."""
+    name = data.header.signals["head_acceleration"].filter
+    if not 0.0 < data.header.signals["head_acceleration"].channel_class < CHANNEL_CLASS:
+        return []
+    return [
+        f"The signals have passed {name}, which rounds flanks and peaks. Each law is therefore the "
+        "one whose simulated acceleration, filtered alike, is the measured one; the grey loops "
+        "have what the filter took away added by it. Peak, 3 ms level and HIC15 below are those of "
+        f"the {name} signals, measured and simulated, and lower than CFC1000 would give them."
+    ]
+
+
 def summary_table(analysis: Mapping[str, Any]) -> Table:
     """Return the fitted laws of an analysis as a table."""
     rows = [
         [name, number(3.6 * e["impact_speed"]), number(e["headform_mass"]),
-         str(len(e["penetration"])), number(1e3 * e["largest_penetration"]),
+         str(len(e["penetration"])),
+         interval({"value": 1e3 * e["largest_penetration"],
+                   **dict(zip(("low", "high"), (1e3 * b for b in e["largest_penetration_interval"]),
+                              strict=True))}),
          interval({key: 1e3 * value for key, value in e["permanent"].items()}),
          interval(e["unloading_ratio"]), number(e["residual"])]
         for name, e in analysis["tests"].items()
@@ -337,6 +361,7 @@ def _report(
                 "integrated twice from first contact, gives penetration; times its mass, force. "
                 "Knots and unloading line are fitted by least squares; intervals are 95 % and "
                 "count noise, speed and mass uncertainty, and the misfit of the curve.",
+                *_filter_words(data),
             ),
             [summary_table(analysis)],
             {"Measured loops (grey), fitted curves with 95 % intervals at the knots, and unloading "
@@ -373,5 +398,7 @@ def _report(
         )  # fmt: skip
     else:
         sections.append(Section("Corridor", (f"A corridor takes {FEWEST_CURVES} tests or more.",)))
+    if analysis["notes"]:
+        sections.append(Section("What was read", analysis["notes"]))
     subtitle = f"Stiffness from {len(tests)} headform tests in {data.source}"
     return render(data.header.title, subtitle, sections)

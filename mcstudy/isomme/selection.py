@@ -77,7 +77,7 @@ def head_acceleration(test: Test, wanted: Sequence[str] = ()) -> HeadSignal:
         chosen = [f for f in heads if _matches(f, wanted)]
         if not chosen:
             raise UserError(
-                f"{test.name}: no head acceleration is {' or '.join(wanted)!r}; it has "
+                f"{test.path}: no head acceleration is {' or '.join(wanted)!r}; it has "
                 f"{_listed(heads)}"
             )
         heads = chosen
@@ -88,7 +88,7 @@ def head_acceleration(test: Test, wanted: Sequence[str] = ()) -> HeadSignal:
         candidates, failed = _candidates(test, heads, []), []
     if not candidates:
         raise UserError(
-            f"{test.name}: has no head acceleration, resultant (??HEAD??????ACR?) or in x, y and z"
+            f"{test.path}: has no head acceleration, resultant (??HEAD??????ACR?) or in x, y and z"
             + _told(failed)
         )
     if not wanted:
@@ -96,7 +96,7 @@ def head_acceleration(test: Test, wanted: Sequence[str] = ()) -> HeadSignal:
         candidates = [c for c in candidates if c.derived == nearest]
     if len(candidates) > 1:
         raise UserError(
-            f"{test.name}: has {len(candidates)} head accelerations: "
+            f"{test.path}: has {len(candidates)} head accelerations: "
             f"{'; '.join(map(str, candidates))}; choose one, for example with "
             f"{_choice(candidates[0], candidates)}"
         )
@@ -155,7 +155,7 @@ def _candidates(
             if by_axis[RESULTANT] and sensor not in broken:
                 options += [_Candidate((f,)) for f in by_axis[RESULTANT]]
         if not options and {f.code[14] for f in own} >= set(AXES):
-            mixed = f"{test.name}: the head acceleration's components are filtered differently"
+            mixed = f"{test.path}: the head acceleration's components are filtered differently"
         best = min((o.rank for o in options), default=None)
         found += [o for o in options if o.rank == best]
     if mixed and not found:
@@ -175,13 +175,13 @@ def _products(axes: Sequence[Sequence[ChannelFile]]) -> list[tuple[ChannelFile, 
 def _combine(test: Test, parts: Sequence[Channel]) -> Channel:
     """Return the resultant (g) of channels."""
     if any(p.time.shape != parts[0].time.shape or np.any(p.time != parts[0].time) for p in parts):
-        raise UserError(f"{test.name}: the head acceleration's components differ in time")
+        raise UserError(f"{test.path}: the head acceleration's components differ in time")
     if len({part.filter for part in parts}) > 1:
-        raise UserError(f"{test.name}: the head acceleration's components are filtered differently")
+        raise UserError(f"{test.path}: the head acceleration's components are filtered differently")
     try:
         values = np.array([part.values * units.factor(part.unit, "g") for part in parts])
     except ValueError as error:
-        raise UserError(f"{test.name}: {parts[0].code}: {error}") from None
+        raise UserError(f"{test.path}: {parts[0].code}: {error}") from None
     kept = np.isfinite(values).all(axis=0)
     code = parts[0].code[:14] + RESULTANT + parts[0].code[15:]
     # A resultant channel stays as it is: its noise before contact may be of either sign.
@@ -195,7 +195,7 @@ def _combine(test: Test, parts: Sequence[Channel]) -> Channel:
         if inside.size < inside[-1] - inside[0] + 1:
             first = inside[0] + int(np.argmin(kept[inside[0] :]))
             raise UserError(
-                f"{test.name}: {code}: no value {1e3 * parts[0].time[first]:.3f} ms, in the middle "
+                f"{test.path}: {code}: no value {1e3 * parts[0].time[first]:.3f} ms, in the middle "
                 "of the record"
             )
     return Channel(code, "g", parts[0].time[kept], found[kept], parts[0].filter, tuple(notes))

@@ -18,6 +18,20 @@ PADDING = 60
 """Samples by which a signal is continued at either end, mirrored about its last point."""
 
 
+SETTLED = 1e-3
+"""Share of a step that a filter still has to go after its settling time."""
+
+
+def settling_time(frequency_class: float) -> float:
+    """Return the time (s) by which a filter's answer reaches before and after its cause.
+
+    The poles of a Butterworth filter of second order decay with its corner frequency over the
+    square root of two.
+    """
+    decay = 2.0 * math.pi * CUTOFF_FACTOR * frequency_class / math.sqrt(2.0)
+    return math.log(1.0 / SETTLED) / decay
+
+
 @functools.cache
 def _sections(frequency_class: float, sampling_rate: float) -> Array:
     wd = 2.0 * math.pi * frequency_class * CUTOFF_FACTOR

@@ -39,7 +39,7 @@ from models.headform.impact import (
     Surface,
     strike,
 )
-from models.headform.outcome import QUIET, SAMPLING_RATE, Test
+from models.headform.outcome import SAMPLING_RATE, Test
 from models.protocol import (
     OK,
     Batch,
@@ -298,11 +298,12 @@ class HeadformModel:
             reading=self._reading(kept, mass, values),
             summary=summary,
             dent=(hood, hood * (1.0 - 1.0 / curve.unloading_ratio)),
+            quiet=outcome.quiet_samples(self.channel_class),
         )
 
     def _reading(self, record: Array, mass: float, values: Mapping[str, float]) -> Record:
         """Return normal and tangential acceleration with flight before and after, filtered."""
-        quiet = round(QUIET * SAMPLING_RATE)
+        quiet = outcome.quiet_samples(self.channel_class)
         padded = np.zeros((record.shape[0] + 2 * quiet, 2))
         forces = record[:, NORMAL : TANGENTIAL + 1]
         padded[quiet : quiet + record.shape[0]] = forces / (mass * STANDARD_GRAVITY)

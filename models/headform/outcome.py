@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.criteria import clip_level, head_injury_criterion
+from models.criteria.filters import settling_time
 from models.effects.reading import Record, retime
 from models.headform.impact import (
     END_SLIDE,
@@ -28,12 +29,15 @@ Array = NDArray[np.float64]
 SAMPLING_RATE = 20_000.0
 """Hz of the accelerometer (SAE J211 asks for ten times the channel frequency class)."""
 QUIET = 0.005
-"""s of flight kept before and after the contact, so that the filter has room."""
+"""s of flight kept before and after the contact, at least: more where the filter needs it."""
 
 
 @dataclass(frozen=True)
 class Test:
-    """One test: impactor, initial speeds, what the loop left behind and the recorder wrote down."""
+    """One test: impactor, initial speeds, what the loop left behind and the recorder wrote down.
+
+    ``quiet`` is the number of samples of flight before and after the contact.
+    """
 
     impactor: Impactor
     speeds: tuple[float, float]
@@ -41,6 +45,13 @@ class Test:
     reading: Record
     summary: Array
     dent: tuple[float, float]
+    quiet: int
+
+
+def quiet_samples(channel_class: float) -> int:
+    """Return the samples of flight before and after a contact that a filter's answer takes."""
+    settling = settling_time(channel_class) if channel_class > 0.0 else 0.0
+    return round(max(QUIET, settling) * SAMPLING_RATE)
 
 
 def measures(test: Test) -> dict[str, Callable[[], float]]:
@@ -69,7 +80,7 @@ def measures(test: Test) -> dict[str, Callable[[], float]]:
 
 def histories(test: Test, wanted: Collection[str] | None) -> dict[str, History]:
     """Return the histories of headform and hood, or those wanted; time 0 is first contact."""
-    quiet = round(QUIET * SAMPLING_RATE)
+    quiet = test.quiet
     record, last = test.record, test.record[-1]
     before = np.arange(-quiet, 0) / SAMPLING_RATE
     after = np.arange(1, quiet + 1) / SAMPLING_RATE

@@ -15,6 +15,7 @@ from mcstudy.diagnosis.problem import Problem, Quantile, Scalar, Signal, Test, U
 from mcstudy.errors import UserError
 from mcstudy.inputs import Distribution
 from mcstudy.measured import HEADER, Measured
+from models.criteria.filters import settling_time
 from models.criteria.units import STANDARD_GRAVITY
 from models.protocol import Model
 from studies.diagnosis.model_choice import ModelChoice
@@ -25,7 +26,7 @@ Array = NDArray[np.float64]
 BIN = 5e-5
 """s: finer samples of a signal are averaged."""
 BEFORE = 1e-3
-"""s before the first sizeable sample up to which a signal counts as noise."""
+"""s before the first sizeable sample up to which a signal counts as noise, at least."""
 SIZEABLE = 0.05
 """Share of the peak from which a sample is sizeable."""
 FEWEST = 3
@@ -112,7 +113,10 @@ def _noise_of(data: Measured, names: Mapping[str, str]) -> dict[str, _Channel]:
         scale = units.factor(entry.unit, unit)
         shrink = np.sqrt(_bin_size(data.signal(data.tests["test"].iloc[0], name, unit)[0]))
         try:
-            noise = estimate_noise([_lead_in(*s) for s in series], entry.sd * scale / shrink)
+            before = max(BEFORE, settling_time(entry.channel_class) if entry.channel_class else 0.0)
+            noise = estimate_noise(
+                [_lead_in(*s, before) for s in series], entry.sd * scale / shrink
+            )
         except ValueError as error:
             raise UserError(f"{place}: signals.{name}: {error}") from None
         found[name] = _Channel(unit, noise.sd, noise.correlation)
@@ -133,10 +137,10 @@ def _thinned(time: Array, values: Array) -> tuple[Array, Array]:
     return means[0], means[1]
 
 
-def _lead_in(time: Array, values: Array) -> Array:
-    """Return the samples before contact."""
+def _lead_in(time: Array, values: Array, before: float) -> Array:
+    """Return the samples before contact, ``before`` (s) which the filter has not answered yet."""
     first = int(np.argmax(np.abs(values) >= SIZEABLE * np.abs(values).max()))
-    return np.asarray(values[time < time[first] - BEFORE])
+    return np.asarray(values[time < time[first] - before])
 
 
 def _test(

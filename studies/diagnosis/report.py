@@ -91,6 +91,8 @@ def sections_of(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list
         sections.append(_gain(analysis, figures))
     sections.append(_visible(analysis))
     sections.append(Section("How it was done", _method(analysis), [_statistics(analysis)]))
+    if analysis["data"].get("notes"):
+        sections.append(Section("What was read", analysis["data"]["notes"]))
     return sections
 
 

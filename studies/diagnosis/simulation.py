@@ -1,5 +1,6 @@
 """Simulated tests: a model of the registry seen through the channels that were measured."""
 
+import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
@@ -8,8 +9,8 @@ from models.criteria.filters import filter_cfc
 from models.protocol import Model, complete_status
 from models.registry import load_model
 
-FILTERED = {"headform": ("head_acceleration",), "multibody": ("head_acceleration",)}
-"""Channels that a model filters itself."""
+FILTERED = {"headform": {"head_acceleration": 0.0}, "multibody": {"head_acceleration": 1000.0}}
+"""Channels that a model filters itself, and by which class; 0 for the class that it is told."""
 DERIVED = {
     "head_acceleration": (
         "hic15",
@@ -101,7 +102,8 @@ class Simulation:
             group, _, channel = self._seen_as(name, run.inputs).partition("_")
             history = run.histories[group]
             signal = history.channels[channel]
-            if channel_class > 0.0 and name not in FILTERED[self.name]:
+            # What a model has filtered by a high class goes on through a lower one.
+            if 0.0 < channel_class < FILTERED[self.name].get(name, math.inf):
                 rate = 1.0 / float(history.time[1] - history.time[0])
                 signal = filter_cfc(signal, rate, channel_class)
             signals[name] = (history.time, signal)

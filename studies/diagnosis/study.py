@@ -1,6 +1,6 @@
 """Diagnosis of a model against measured tests, from a folder of data to a report."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -31,6 +31,7 @@ from studies.diagnosis.problem import build_problem
 from studies.diagnosis.report import draw, sections_of, subtitle_of
 from studies.diagnosis.simulation import Simulation
 from studies.execution import publish
+from studies.headform_records import keep_first_impacts, note_lines
 
 Array = NDArray[np.float64]
 
@@ -46,6 +47,7 @@ def diagnose(
     folder: ResultsFolder,
     *,
     model_config: Path | None = None,
+    channels: Sequence[str] = (),
     seed: int = 0,
     workers: int = -1,
     quiet: bool = True,
@@ -57,6 +59,7 @@ def diagnose(
     source : folder of measured data or of ISO-MME tests.
     folder : where the diagnosis goes.
     model_config : study file whose model is diagnosed; by default the model that the data name.
+    channels : of ISO-MME tests, which to take; see ``mcstudy.isomme.head_acceleration``.
     seed : of the simulated data sets. workers : processes, -1 for one a core.
     quiet : print no progress.
 
@@ -70,7 +73,7 @@ def diagnose(
     UserError
         If the data or the model are wrong, or do not fit each other.
     """
-    data = load_measured(source)
+    data = keep_first_impacts(load_measured(source, channels))
     if folder.path.resolve() == data.source.resolve():
         raise UserError(f"{folder.path}: holds the measured data; choose another --out")
     choice = choose_model(data, model_config)
@@ -131,7 +134,12 @@ def _write(
         before, after = conclusions.conclude(text), conclusions.conclude(longer)
     answer = {
         "format": "mcstudy-diagnosis/1",
-        "data": {"title": data.header.title, "tests": len(problem.tests), "model": choice.name},
+        "data": {
+            "title": data.header.title,
+            "tests": len(problem.tests),
+            "model": choice.name,
+            "notes": note_lines(data),
+        },
         "adequate": finding.adequate,
         "p_value": finding.screening.p_value,
         "flip_p_value": finding.screening.flip_p_value,

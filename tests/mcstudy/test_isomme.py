@@ -191,7 +191,7 @@ def test_tests_without_head_acceleration(
     tmp_path: Path, codes: tuple[str, ...], message: str
 ) -> None:
     test = read_test(write_test(tmp_path / "T", "T7", dict.fromkeys(codes, (VALUES, "g")), **GIVEN))
-    with pytest.raises(UserError, match=f"T7: .*{message}"):
+    with pytest.raises(UserError, match=rf"T7\.mme: .*{message}"):
         head_acceleration(test)
 
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from models.contact.law import ForceCurve
 from models.criteria import contact_window, filter_cfc
 from models.criteria.units import STANDARD_GRAVITY
-from models.headform.identification import StiffnessFit, fit_stiffness, force_penetration
+from models.headform.identification import StiffnessFit, fit_stiffness
+from models.headform.loop import force_penetration
 from models.protocol import Run
 from models.registry import load_model
 
@@ -282,7 +283,7 @@ def test_filtered_signals_are_not_filtered_again() -> None:
     time, values = noisy("hood", 4)
     raw = fit_stiffness(time, values, SPEED, MASS, draws=0)
     clean = filter_cfc(values, 1e4, 1000.0)
-    filtered = fit_stiffness(time, clean, SPEED, MASS, filtered=True, draws=0)
+    filtered = fit_stiffness(time, clean, SPEED, MASS, channel_class=1000.0, draws=0)
     np.testing.assert_array_equal(raw.curve.force, filtered.curve.force)
     again = fit_stiffness(time, clean, SPEED, MASS, draws=0)
     assert not np.array_equal(again.loop.force, raw.loop.force)

@@ -1,0 +1,56 @@
+"""What the command line prints: any text, on any terminal."""
+
+import sys
+from collections.abc import Iterable, Sequence
+from typing import TextIO
+
+from rich.console import Console
+from rich.table import Table as RichTable
+from rich.text import Text
+
+WIDEST = 10_000
+"""Columns where the output is no terminal: a file cuts nothing."""
+
+
+def accept_any_text(streams: Iterable[TextIO]) -> None:
+    """Let streams print a replacement for what their encoding has no character for."""
+    for stream in streams:
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+
+
+def printable(text: str) -> str:
+    """Return a text without the characters that steer a terminal."""
+    return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)
+
+
+def print_lines(lines: Iterable[str]) -> None:
+    """Print paragraphs; nothing in them is markup."""
+    console = _console()
+    for line in lines:
+        console.print(Text(printable(line)), soft_wrap=not console.is_terminal)
+
+
+def print_path(what: str, path: object) -> None:
+    """Print where something is, never broken."""
+    _console().print(Text(printable(f"{what}: {path}")), soft_wrap=True)
+
+
+def print_table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print a table of text, nothing in it markup.
+
+    On a terminal long cells are folded; elsewhere lines are as long as it takes.
+    """
+    shown = RichTable(title=Text(printable(caption)) if caption else None)
+    for name in head:
+        shown.add_column(Text(printable(name)), overflow="fold")
+    for row in rows:
+        shown.add_row(*(Text(printable(cell)) for cell in row))
+    _console().print(shown)
+
+
+def _console() -> Console:
+    terminal = sys.stdout.isatty()
+    return Console(
+        markup=False, emoji=False, highlight=False, width=None if terminal else WIDEST
+    )  # fmt: skip

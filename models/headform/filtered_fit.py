@@ -1,0 +1,247 @@
+"""The law of a hood from an acceleration that a low channel class has rounded.
+
+A filter of CFC 60 smears the flank and the corner of unloading over milliseconds: integrated twice,
+such a signal gives too long a way and first contact too early. Here the test is simulated with a
+trial law, the simulated acceleration passes the same filter, and the two filtered signals are
+compared. First contact, knots, slopes and unloading ratio are found by least squares; the number of
+knots by the Bayesian information criterion, as for signals that are integrated.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize
+
+from models.contact.law import KNOTS, ForceCurve, law_of
+from models.contact.loading import MOST_KNOTS, SPACING
+from models.criteria.filters import CUTOFF_FACTOR, filter_cfc, settling_time
+from models.criteria.units import STANDARD_GRAVITY
+from models.headform.impact import (
+    COLUMNS,
+    DEEPEST,
+    END_TIME,
+    NORMAL,
+    SAMPLES,
+    SUMMARY,
+    Impactor,
+    Surface,
+    strike,
+)
+
+Array = NDArray[np.float64]
+
+RATE = 20_000.0
+"""Hz at which the simulated signal is filtered."""
+STRIDE = 5
+"""Steps of the simulation a sample."""
+LONGEST = 0.15
+"""s of contact after which a trial law is given up."""
+FINEST = 1e-4
+"""Change of a parameter from which its derivative is taken; all are logarithms or milliseconds."""
+FLATTEST, STEEPEST = 1e2, 1e8
+"""N/m that a slope may have."""
+LEAST_RATIO, MOST_RATIO = 1.001, 1e3
+"""Of the unloading line, as for signals that are integrated."""
+
+
+@dataclass(frozen=True)
+class FilteredFit:
+    """A law fitted through a filter.
+
+    Attributes
+    ----------
+    curve : ForceCurve, its last knot at the largest penetration. onset : s, first contact.
+    taken : (n,) g, what the filter has taken away of the signal, by the fitted law.
+    residual : g, root mean square that the fit leaves.
+    parameters : of the search, to start others from.
+    """
+
+    curve: ForceCurve
+    onset: float
+    taken: Array
+    residual: float
+    parameters: Array
+
+
+@dataclass(frozen=True)
+class _Signal:
+    """What is fitted: s, g, speed (m/s), mass (kg), channel class."""
+
+    time: Array
+    acceleration: Array
+    speed: float
+    mass: float
+    channel_class: float
+
+
+def fit_through_filter(
+    time: Array,
+    acceleration: Array,
+    speed: float,
+    mass: float,
+    channel_class: float,
+    start: ForceCurve,
+    onset: float,
+    knots: int,
+) -> FilteredFit:
+    """Return the law that gives a filtered acceleration when its simulation is filtered alike.
+
+    Parameters
+    ----------
+    time, acceleration : (n,) s and g, uniform, without offset, filtered by ``channel_class``.
+    speed, mass : m/s and kg. start : law to start from. onset : s, first contact of it.
+    knots : most knots, 2 to 8.
+
+    Raises
+    ------
+    ValueError
+        If no law gives a contact that ends.
+    """
+    signal = _Signal(time, acceleration, speed, mass, channel_class)
+    depth, force = float(start.penetration[-1]), float(start.force[-1])
+    first = np.array([1e3 * onset, _log_ratio(start.unloading_ratio), math.log(force / depth)])
+    best = _search(signal, first)
+    count = _independent(signal)
+    score = _score(signal, best, count)
+    while _segments(best) < min(knots, MOST_KNOTS) - 1:
+        trials = [_search(signal, trial) for trial in _with_a_knot(signal, best)]
+        if not trials:
+            break
+        longer = min(trials, key=lambda p: float(np.sum(_left(signal, p) ** 2)))
+        found = _score(signal, longer, count)
+        if found >= score:
+            break
+        best, score = longer, found
+    return _describe(signal, best)
+
+
+def repeat_fit(
+    time: Array,
+    acceleration: Array,
+    speed: float,
+    mass: float,
+    channel_class: float,
+    parameters: Array,
+) -> FilteredFit:
+    """Return the law of a signal like another, from the other's parameters and with its knots.
+
+    Raises
+    ------
+    ValueError
+        If no law gives a contact that ends.
+    """
+    signal = _Signal(time, acceleration, speed, mass, channel_class)
+    return _describe(signal, _search(signal, parameters))
+
+
+def _segments(parameters: Array) -> int:
+    """Return the number of segments: their log slopes, and log widths of all but the last."""
+    return (parameters.size - 1) // 2
+
+
+def _curve_of(parameters: Array) -> ForceCurve:
+    """Return the law of onset (ms), log (ratio - 1), log slopes (N/m) and log widths (m)."""
+    count = _segments(parameters)
+    slopes = np.exp(np.clip(parameters[2 : 2 + count], math.log(FLATTEST), math.log(STEEPEST)))
+    widths = np.append(np.exp(np.clip(parameters[2 + count :], -12.0, 2.0)), 1.0)
+    ratio = 1.0 + math.exp(min(max(parameters[1], math.log(LEAST_RATIO - 1.0)),
+                               math.log(MOST_RATIO - 1.0)))  # fmt: skip
+    places = np.concatenate([[0.0], np.cumsum(widths)])
+    return ForceCurve(places, np.concatenate([[0.0], np.cumsum(slopes * widths)]), ratio)
+
+
+def _log_ratio(ratio: float) -> float:
+    return math.log(min(max(ratio, LEAST_RATIO), MOST_RATIO) - 1.0)
+
+
+def _simulate(signal: _Signal, parameters: Array) -> tuple[Array, Array, float] | None:
+    """Return the simulated acceleration (g) raw and filtered at the signal's times, and the depth.
+
+    None if the contact does not end.
+    """
+    laws = np.zeros((1, KNOTS, 4))
+    count = law_of(_curve_of(parameters), laws[0])
+    record, summary = np.empty((round(LONGEST * RATE), COLUMNS)), np.zeros(SUMMARY)
+    strike(
+        Impactor(signal.mass, 1.0, 1.0), Surface(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.01),
+        laws, count, signal.speed, 0.0, 1.0 / (RATE * STRIDE), STRIDE, record, summary,
+    )  # fmt: skip
+    if math.isnan(summary[END_TIME]):
+        return None
+    samples = int(summary[SAMPLES])
+    room = round(settling_time(signal.channel_class) * RATE) + 1
+    raw = np.zeros(samples + 2 * room)
+    raw[room : room + samples] = record[:samples, NORMAL] / (signal.mass * STANDARD_GRAVITY)
+    filtered = filter_cfc(raw, RATE, signal.channel_class)
+    since = (np.arange(raw.size) - room) / RATE
+    at = signal.time - 1e-3 * parameters[0]
+    both = (np.interp(at, since, values, left=0.0, right=0.0) for values in (raw, filtered))
+    return next(both), next(both), float(summary[DEEPEST])
+
+
+def _left(signal: _Signal, parameters: Array) -> Array:
+    """Return what a law leaves of the signal (g); all of it if its contact does not end."""
+    found = _simulate(signal, parameters)
+    return signal.acceleration - (0.0 if found is None else found[1])
+
+
+def _search(signal: _Signal, start: Array) -> Array:
+    """Return the parameters of least squares, from others."""
+
+    def left(parameters: Array) -> Array:
+        return _left(signal, parameters)
+
+    found = optimize.least_squares(
+        left, start, method="trf", x_scale=np.full(start.size, 0.1),
+        diff_step=np.full(start.size, FINEST), max_nfev=40, ftol=1e-10, xtol=1e-10, gtol=1e-12,
+    )  # fmt: skip
+    return np.asarray(found.x, dtype=np.float64)
+
+
+def _with_a_knot(signal: _Signal, parameters: Array) -> list[Array]:
+    """Return parameters of the same law with a knot more, at places that leave room for it."""
+    found = _simulate(signal, parameters)
+    if found is None:
+        return []
+    end, count = found[2], _segments(parameters)
+    widths = np.exp(parameters[2 + count :])
+    places = np.concatenate([[0.0], np.cumsum(widths), [end]])
+    trials = []
+    for place in end * np.arange(SPACING, 1.0 - 0.5 * SPACING, SPACING):
+        if np.abs(places - place).min() < 0.999 * SPACING * end:
+            continue
+        k = int(np.searchsorted(places, place)) - 1
+        slopes = np.insert(parameters[2 : 2 + count], k, parameters[2 + k])
+        inner = np.sort(np.append(places[1:-1], place))
+        moved = np.log(np.diff(np.concatenate([[0.0], inner])))
+        trials.append(np.concatenate([parameters[:2], slopes, moved]))
+    return trials
+
+
+def _independent(signal: _Signal) -> float:
+    """Return how many samples of the filtered signal are independent."""
+    length = float(signal.time[-1] - signal.time[0])
+    return max(2.0 * CUTOFF_FACTOR * signal.channel_class * length, 4.0)
+
+
+def _score(signal: _Signal, parameters: Array, count: float) -> float:
+    """Return the Bayesian information criterion; a knot costs its place and its slope."""
+    size = (1e-6 * float(signal.acceleration.max())) ** 2
+    misfit = float(np.mean(_left(signal, parameters) ** 2)) + size
+    return count * math.log(misfit) + 2.0 * math.log(count) * (_segments(parameters) - 1)
+
+
+def _describe(signal: _Signal, parameters: Array) -> FilteredFit:
+    found = _simulate(signal, parameters)
+    if found is None:
+        raise ValueError("no law gives a contact that ends: check speed, mass and unit")
+    raw, filtered, deepest = found
+    curve = _curve_of(parameters)
+    inner = curve.penetration[1:-1]
+    inner = inner[inner < deepest]
+    places = np.concatenate([[0.0], inner, [deepest]])
+    residual = float(np.sqrt(np.mean((signal.acceleration - filtered) ** 2)))
+    law = ForceCurve(places, curve.at(places), curve.unloading_ratio)
+    return FilteredFit(law, 1e-3 * parameters[0], raw - filtered, residual, parameters)

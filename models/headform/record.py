@@ -1,0 +1,203 @@
+"""The first impact in a record of acceleration, and what else the record holds.
+
+A record may begin with disturbances (a release, a spike of the electronics) and go on after the
+impact: the headform falls on the floor, often harder than on the hood. The impact is the first
+event that takes most of the recorded speed away; what comes before and after is left out and told.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from models.criteria.units import STANDARD_GRAVITY
+
+Array = NDArray[np.float64]
+
+WINDOW = 0.001
+"""s over which the record is averaged to tell events (assumed)."""
+GAP = 0.003
+"""s that two events lie apart at least; a contact with two peaks is one (assumed)."""
+SHORTEST = 0.002
+"""s that an impact lasts at least (assumed)."""
+LEVEL = 0.1
+"""Share of the largest average from which on an event counts."""
+SLOWEST = 0.05
+"""s in which an impact takes a quarter of the speed at least: a softer rise is none (assumed)."""
+MOST = 0.5
+"""Share of the speed that an impact takes at least; a rebound takes more than all of it."""
+STOPPED = 0.97
+"""Share of the speed from which on a headform counts as stopped: speed and mass are not exact."""
+SIZEABLE = 0.02
+"""Share of the speed from which on another event is told."""
+OUT_OF_NOISE = 8.0
+"""Standard deviations from which on a single sample is a spike (assumed)."""
+SPIKE = 0.2
+"""Share of the largest average from which on a single sample is a spike."""
+LONELY = 0.25
+"""Share of a spike by which its neighbours may differ from each other."""
+FEWEST_QUIET = 20
+"""Samples between a disturbance and contact that are kept as quiet, if there are so many."""
+FLAT, SHOULDER = 3, 0.95
+"""Equal largest readings that may be a plateau, and the share of the peak whose duration they are
+compared with."""
+CLIPPED = 0.5
+"""Share of that duration from which on equal readings are a clipped peak: of a round peak they are
+a tenth (assumed)."""
+
+
+@dataclass(frozen=True)
+class Impact:
+    """The first impact of a record.
+
+    Attributes
+    ----------
+    time, acceleration : (n,) s and g, the record without what is left out.
+    notes : what was left out and what is wrong.
+    """
+
+    time: Array
+    acceleration: Array
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Event:
+    """Samples from ``start`` to before ``stop``; speed (m/s) that they take; largest g."""
+
+    start: int
+    stop: int
+    speed: float
+    peak: float
+
+
+def first_impact(time: ArrayLike, acceleration: ArrayLike, speed: float) -> Impact:
+    """Return the first impact of a record.
+
+    Parameters
+    ----------
+    time : (n,) s, uniform. acceleration : (n,) g, finite, against the motion.
+    speed : m/s, before the impact.
+
+    Notes
+    -----
+    A record in which no event takes half of the speed comes back whole.
+    """
+    t = np.asarray(time, dtype=np.float64)
+    a = np.array(acceleration, dtype=np.float64)
+    if t.size < FLAT or not (np.all(np.isfinite(a)) and speed > 0.0):
+        return Impact(t, a, ())
+    step = float(t[-1] - t[0]) / (t.size - 1)
+    notes = _remove_spikes(t, a, step)
+    base = _base(a)
+    events = _events(a - base, step, speed)
+    impact = next(
+        (k for k, e in enumerate(events)
+         if e.speed >= MOST * speed and (e.stop - e.start) * step >= SHORTEST),
+        None,
+    )  # fmt: skip
+    if impact is None:
+        return Impact(t, a, tuple(notes))
+    own, first, last = events[impact], 0, t.size
+    later = events[impact + 1 :]
+    # A contact that has not stopped the headform yet goes on in its next peak.
+    while later and own.speed < STOPPED * speed and (later[0].start - own.stop) * step < SLOWEST:
+        own = _Event(own.start, later[0].stop, own.speed + later[0].speed,
+                     max(own.peak, later[0].peak))  # fmt: skip
+        del later[0]
+    for event in events[:impact]:
+        if event.speed < SIZEABLE * speed:
+            continue
+        notes.append(
+            f"a disturbance of {event.peak:.3g} g {1e3 * t[event.start]:.1f} ms, before the "
+            "impact, is left out"
+        )
+        reach = event.stop + round(WINDOW / step)
+        if own.start - reach >= FEWEST_QUIET:
+            first = reach
+        else:
+            a[event.start : min(reach, own.start)] = base
+    for event in later:
+        if event.speed < SIZEABLE * speed:
+            continue
+        last = max(own.stop, event.start - round(WINDOW / step))
+        notes.append(
+            f"a later impact of {event.peak:.3g} g {1e3 * t[event.start]:.1f} ms is left out, with "
+            "all that follows"
+        )
+        break
+    inside = slice(own.start, min(own.stop, last))
+    if clipping := _clipping(t[inside], a[inside]):
+        notes.append(clipping)
+    return Impact(t[first:last], a[first:last], tuple(notes))
+
+
+def _remove_spikes(t: Array, a: Array, step: float) -> list[str]:
+    """Replace single samples far from both neighbours, in place; return what was replaced."""
+    middle = 0.5 * (a[:-2] + a[2:])
+    away = a[1:-1] - middle
+    noise = float(np.median(np.abs(away))) / 0.6745
+    size = float(np.abs(_averaged(a, step)).max())
+    lonely = (np.abs(away) > max(OUT_OF_NOISE * noise, SPIKE * size)) & (
+        np.abs(a[2:] - a[:-2]) < LONELY * np.abs(away)
+    )
+    # A spike's own neighbours lie away from their middle as well, by half of it.
+    places = [
+        k for k in np.flatnonzero(lonely)
+        if abs(away[k]) >= np.abs(away[max(k - 1, 0) : k + 2]).max()
+    ]  # fmt: skip
+    notes = [
+        f"a single sample of {a[k + 1]:.3g} g {1e3 * t[k + 1]:.2f} ms, between {a[k]:.3g} and "
+        f"{a[k + 2]:.3g} g, is taken for a spike and replaced"
+        for k in places[:3]
+    ]
+    if len(places) > len(notes):
+        notes.append(f"{len(places) - len(notes)} more single samples are replaced likewise")
+    for k in places:
+        a[k + 1] = middle[k]
+    return notes
+
+
+def _averaged(a: Array, step: float) -> Array:
+    count = max(1, round(WINDOW / step))
+    return np.convolve(a, np.full(count, 1.0 / count), mode="same")
+
+
+def _base(a: Array) -> float:
+    """Return about where the sensor stands without an impact: before it, or after it."""
+    return float(min(np.median(a[:5]), np.median(a[-max(5, a.size // 5) :])))
+
+
+def _events(a: Array, step: float, speed: float) -> list[_Event]:
+    """Return the stretches in which the averaged signal is up, in order."""
+    smooth = _averaged(a, step)
+    level = min(LEVEL * float(smooth.max()), 0.25 * speed / (STANDARD_GRAVITY * SLOWEST))
+    if not level > 0.0:
+        return []
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], smooth > level, [0]]).astype(int)))
+    runs = edges.reshape(-1, 2)
+    joined: list[list[int]] = []
+    for start, stop in runs.tolist():
+        if joined and (start - joined[-1][1]) * step < GAP:
+            joined[-1][1] = stop
+        else:
+            joined.append([start, stop])
+    return [
+        _Event(start, stop, STANDARD_GRAVITY * step * float(a[start:stop].sum()),
+               float(a[start:stop].max()))
+        for start, stop in joined
+    ]  # fmt: skip
+
+
+def _clipping(t: Array, a: Array) -> str:
+    """Return what to say of a peak that looks clipped, or nothing."""
+    top = float(a.max())
+    flat = int(np.sum(a == top))
+    near = int(np.sum(a >= SHOULDER * top))
+    if flat < FLAT or flat < CLIPPED * near:
+        return ""
+    return (
+        f"the largest reading, {top:.4g} g, stands in {flat} samples from "
+        f"{1e3 * t[int(np.argmax(a == top))]:.1f} ms on: the sensor or its record seems clipped, "
+        "peak and HIC are too low, penetration is too large"
+    )

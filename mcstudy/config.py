@@ -293,6 +293,7 @@ def numbers_digest(study: SampledStudy, model: Simulator) -> dict[str, str]:
             topics["design.second_order"] = study.design.second_order
         else:
             topics["design.levels"] = study.design.levels
+            topics["design.grid"] = "shifted"
     topics |= {f"inputs.{name}": entry for name, entry in table["inputs"].items()}
     topics |= {f"fixed.{name}": entry for name, entry in table["fixed"].items()}
     topics |= {f"effects.{name}": entry for name, entry in table["effects"].items()}

@@ -3,15 +3,21 @@
 import math
 from collections.abc import Mapping
 
+SMALL, LARGE = 1e-9, 1e9
 _UNITS = {"1": "", "m/s2": "m/s²", "rad/s2": "rad/s²"}
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """Return a number with the given significant digits, never in powers of ten below a million."""
+    """Return a number with the given significant digits.
+
+    In powers of ten only where it is longer than people read: above a billion, below a billionth.
+    """
     if value is None or not math.isfinite(value):
         return "–"
     if value == 0.0:
         return "0"
+    if not SMALL <= abs(value) < LARGE:
+        return f"{value:.{digits - 1}e}"
     # The exponent after rounding: 9.999 to three digits is 10.0.
     exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])
     return f"{value:,.{max(0, digits - 1 - exponent)}f}"

@@ -27,6 +27,8 @@ def at_work(workers: Workers) -> Iterator[None]:
         with on_cluster(workers):
             yield
         return
+    # A file of the user's own in the working folder, such as signal.py, is no module of ours.
+    os.environ.setdefault("PYTHONSAFEPATH", "1")
     # With a single process joblib runs it all here, where a crash takes the driver along.
     n_jobs = max(2, os.cpu_count() or 1) if workers == -1 else workers
     with joblib.parallel_config(backend="loky", n_jobs=n_jobs):

@@ -7,6 +7,7 @@ package: any edit gives a fresh cache, an unchanged installation never recompile
 
 import hashlib
 import os
+import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -22,24 +23,60 @@ def _source_digest() -> str:
     return digest.hexdigest()[:16]
 
 
-def _cache_folder() -> Path:
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = base / "mcstudy" / f"kernels-{_source_digest()}"
+def _usable(folder: Path) -> bool:
+    """Return whether a folder is there, or can be made, and can be written."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+        # Compiled code that somebody else may have put there is not run.
+        return not hasattr(os, "getuid") or folder.stat().st_uid == os.getuid()
     except OSError:
-        folder = Path(tempfile.gettempdir()) / f"mcstudy-kernels-{_source_digest()}"
-        folder.mkdir(parents=True, exist_ok=True)
-    return folder
+        return False
 
 
+def _cache_folder() -> Path | None:
+    """Return the folder of compiled kernels: in the user's cache, else in the temporary folder.
+
+    None if neither can be written: the kernels are compiled anew in every process then.
+    """
+    name = f"kernels-{_source_digest()}"
+    try:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    except RuntimeError:
+        # Neither HOME nor an entry among the users, as in containers.
+        wanted = None
+    else:
+        wanted = base / "mcstudy" / name
+        if _usable(wanted):
+            return wanted
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    why = "there is no home folder" if wanted is None else f"{wanted} cannot be written"
+    try:
+        other = Path(tempfile.gettempdir()) / f"mcstudy-{user}-{name}"
+    except OSError:
+        other = None
+    if other is not None and _usable(other):
+        print(f"mcstudy: {why}: compiled kernels are kept in {other}", file=sys.stderr)
+        return other
+    print(f"mcstudy: {why}: kernels are compiled anew in every process", file=sys.stderr)
+    return None
+
+
+_CACHED = True
 if "NUMBA_CACHE_DIR" not in os.environ:
-    numba.config.CACHE_DIR = str(_cache_folder())  # type: ignore[attr-defined]
+    _folder = _cache_folder()
+    _CACHED = _folder is not None
+    if _folder is not None:
+        numba.config.CACHE_DIR = str(_folder)  # type: ignore[attr-defined]
+        if _folder.name.startswith("mcstudy-"):
+            # Worker processes take it over and say nothing.
+            os.environ["NUMBA_CACHE_DIR"] = str(_folder)
 
 
 def _compile(function: Callable[..., Any], inline: bool) -> Callable[..., Any]:
     flags: dict[str, Any] = {
-        "cache": True,
+        "cache": _CACHED,
         "error_model": "numpy",
         "fastmath": {"contract"},
         "forceinline": inline,

@@ -7,6 +7,8 @@ import numpy as np
 from mcstudy import isomme
 from models.protocol import Run
 
+FEWEST = 8
+"""Samples that an impact with the road takes at least."""
 # Dummy or impactor without a seat; child headform and virtual child of six in the code list of
 # ISO/TS 13499, which knows no pedestrian of seven.
 _DEVICE = {"headform": "PC", "multibody": "V6"}
@@ -22,35 +24,67 @@ _CODES = {
 """Channel codes by history group and channel."""
 
 
-def write_isomme(run: Run, model: str, folder: Path, *, name: str, title: str) -> Path | None:
-    """Write the head signals of a run as an ISO-MME test and return its ``.mme`` file.
+CAR, ROAD = "car", "road"
+"""Phases of a crash: up to the body's first contact with the road, and from it on."""
+_PHASES = {
+    CAR: "Impact with the car: ends when trunk or head first meet the road; the impact with the "
+    "road is a test of its own.",
+    ROAD: "Impact with the road: begins when trunk or head first meet it; the impact with the car "
+    "is a test of its own.",
+}
+
+
+def write_isomme(run: Run, model: str, folder: Path, *, name: str, title: str) -> list[Path]:
+    """Write the head signals of a run as ISO-MME tests and return their ``.mme`` files.
+
+    A crash is two tests, the impact with the car and that with the road: criteria of one head
+    signal that held both would be those of the harder one.
 
     Parameters
     ----------
-    run : Run with histories. model : name of the model. folder : the test's folder, created.
-    name, title : of the test.
+    run : Run with histories. model : name of the model.
+    folder : in which each test has a folder of its name.
+    name, title : of the test; the impact with the road has ``_road`` behind its name.
 
     Returns
     -------
-    Path or None
-        None if the model has no code in the format or the run no such history.
+    list of Path
+        Empty if the model has no code in the format or the run no such history.
     """
     if model not in _DEVICE or "head" not in run.histories:
-        return None
-    channels = {}
+        return []
     time = run.histories["head"].time
+    landing = run.outputs.get("ground_time", np.inf)
+    split = int(np.searchsorted(time, landing)) if np.isfinite(landing) else time.size
+    if "ground_time" not in run.outputs:
+        return [_write(run, model, folder / name, slice(0, None), name, title, "")]
+    files = [_write(run, model, folder / name, slice(0, split), name, title, _PHASES[CAR])]
+    if time.size - split >= FEWEST:
+        name = f"{name}_{ROAD}"
+        files.append(
+            _write(run, model, folder / name, slice(split, None), name, title, _PHASES[ROAD])
+        )
+    return files
+
+
+def _write(
+    run: Run, model: str, folder: Path, phase: slice, name: str, title: str, comment: str
+) -> Path:
+    channels = {}
+    head = run.histories["head"].time
     for (group, channel), code in _CODES.items():
         history = run.histories.get(group)
         if history is not None and channel in history.channels:
-            values = history.channels[channel]
+            values = history.channels[channel][phase]
             channels[code.format(_DEVICE[model])] = (values, history.units[channel])
     return isomme.write_test(
         folder,
         name,
         channels,
-        start=float(time[0]),
-        interval=float(np.diff(time).mean()),
+        start=float(head[phase][0]),
+        interval=float(np.diff(head).mean()),
         title=title,
+        comment=comment,
         velocity=run.inputs.get("impact_speed", np.nan),
         mass=run.inputs.get("headform_mass", np.nan),
     )

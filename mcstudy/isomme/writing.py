@@ -24,6 +24,7 @@ def write_test(
     start: float,
     interval: float,
     title: str = "",
+    comment: str = "",
     velocity: float = np.nan,
     mass: float = np.nan,
 ) -> Path:
@@ -35,7 +36,7 @@ def write_test(
     name : of the test, letters and digits.
     channels : values and unit by 16-character code.
     start, interval : s, time of the first sample and between samples.
-    title, velocity, mass : of the test; m/s and kg of test object 1.
+    title, comment, velocity, mass : of the test; m/s and kg of test object 1.
 
     Raises
     ------
@@ -60,6 +61,7 @@ def write_test(
             "Laboratory name": "mcstudy",
             "Title": title or MISSING,
             "Type of the test": "simulation",
+            "Comments": comment or MISSING,
             "Number of test objects": "1",
             "Name of test object 1": name,
             "Velocity test object 1": given(velocity),

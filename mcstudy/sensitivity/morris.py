@@ -4,6 +4,10 @@ Every trajectory changes one factor after the other by one large step. The mean 
 changes (mu*) ranks the factors at the cost of a few dozen runs each, their scatter (sigma) shows
 interactions and curvature (M. Morris, Technometrics 33, 1991; F. Campolongo, J. Cariboni,
 A. Saltelli, Environmental Modelling and Software 22, 2007).
+
+With one size of step an output that repeats itself after just this step, as one of a periodic input
+may, has no effect at all. The grid of each trajectory is therefore shrunk by a random factor, and
+that of each input shifted: steps have any size from half of Morris's to all of it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,11 +18,14 @@ from numpy.typing import NDArray
 
 from mcstudy import seeds
 from mcstudy.sensitivity.factors import factors_of, nudged, salib_problem
+from mcstudy.statistics import scale_of, varies
 
 Array = NDArray[np.float64]
 
 TAIL = 0.025
 """Levels lie between this and one minus this in an input's probability (assumed)."""
+SMALLEST_GRID = 0.5
+"""Share of its range that a trajectory's grid has at least (assumed)."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +35,8 @@ class Trajectories:
     Attributes
     ----------
     uniforms : (n * block, d) of the inputs, the dummy's nudge applied.
-    levels : (n * block, d + 1) levels of the inputs and the dummy, 0 to 1.
+    levels : (n * block, d + 1) places of the inputs and the dummy, 0 to 1: levels of the grid of
+        their trajectory.
     factors : names of what is changed, inputs or groups, the dummy last.
     block : rows of one trajectory. trajectory : (n * block,) of each row.
     """
@@ -74,14 +82,22 @@ def draw_trajectories(
     from SALib.sample import morris
 
     problem = salib_problem(inputs, groups)
-    streams = (seeds.generator(seed, seeds.MORRIS, k) for k in range(n))
     rows = np.concatenate(
-        [morris.sample(problem, 1, num_levels=levels, seed=stream) for stream in streams]
+        [
+            _shifted(morris.sample(problem, 1, num_levels=levels, seed=stream), stream)
+            for stream in (seeds.generator(seed, seeds.MORRIS, k) for k in range(n))
+        ]
     )
     factors = factors_of(inputs, groups)
     block = len(factors) + 1
     uniforms = nudged(TAIL + (1.0 - 2.0 * TAIL) * rows[:, :-1], rows[:, -1])
     return Trajectories(uniforms, rows, factors, block, np.arange(n * block) // block)
+
+
+def _shifted(rows: Array, stream: np.random.Generator) -> Array:
+    """Return a trajectory on a grid that is smaller, and elsewhere for each input."""
+    size = stream.uniform(SMALLEST_GRID, 1.0)
+    return stream.uniform(0.0, 1.0 - size, rows.shape[1]) + size * rows
 
 
 def estimate_effects(
@@ -99,7 +115,7 @@ def estimate_effects(
     Parameters
     ----------
     inputs, groups, levels : as drawn.
-    rows : (n * block, d + 1) levels of the trajectories. outputs : (n * block,), all finite.
+    rows : (n * block, d + 1) places of the trajectories. outputs : (n * block,), all finite.
     resamples, seed : of the bootstrap over trajectories that gives the 95 % intervals of mu*.
 
     Raises
@@ -114,16 +130,25 @@ def estimate_effects(
     count = outputs.size // (len(factors_of(inputs, groups)) + 1)
     if count < 2:
         raise ValueError("elementary effects take two trajectories or more")
+    scale = scale_of(outputs)
+    # Effects of an output that does not vary beyond rounding are zero, not rounding.
+    scaled = outputs / scale if varies(outputs) else np.zeros_like(outputs)
+    # SALib divides by Morris's step; each trajectory has its own.
+    paths = rows.reshape(count, -1, rows.shape[1])
+    steps = np.abs(np.diff(paths, axis=1)).max(axis=(1, 2))
+    morris_step = levels / (2.0 * (levels - 1))
+    scaled = (scaled.reshape(count, -1) * (morris_step / steps)[:, None]).ravel()
     found = morris.analyze(
         salib_problem(inputs, groups),
         rows,
-        outputs,
+        scaled,
         num_levels=levels,
         num_resamples=resamples,
         seed=seeds.generator(seed, seeds.BOOTSTRAP),
     )
-    size, reach = (np.asarray(found[key], dtype=float) for key in ("mu_star", "mu_star_conf"))
-    spread = np.asarray(found["sigma"], dtype=float)
+    size, reach, spread = (
+        scale * np.asarray(found[key], dtype=float) for key in ("mu_star", "mu_star_conf", "sigma")
+    )
     # The members of a group move up or down on their own: their mean has no sign.
-    mean = np.where(np.isnan(spread), np.nan, np.asarray(found["mu"], dtype=float))
+    mean = np.where(np.isnan(spread), np.nan, scale * np.asarray(found["mu"], dtype=float))
     return ElementaryEffects(mean, np.stack([size, size - reach, size + reach]), spread, count)

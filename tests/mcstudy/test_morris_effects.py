@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from SALib.analyze import morris as salib_morris
+from SALib.sample import morris as salib_sample
+from scipy import integrate
 
 from mcstudy import seeds
 from mcstudy.sensitivity.factors import DUMMY, NUDGE
@@ -69,36 +71,53 @@ def direct_effects(design: Trajectories, outputs: Array) -> Array:
 def test_a_trajectory_changes_every_factor_once_by_one_large_step(
     groups: dict[str, list[str]], levels: int
 ) -> None:
-    # Morris 1991: p levels 0, 1 / (p - 1), ..., 1 and steps of p / (2 (p - 1)).
+    # Morris 1991: steps of p / (2 (p - 1)) on p levels; here of half of it up to all of it.
     design = draw_trajectories(INPUTS, groups, 12, levels, 3)
     names = [*INPUTS, DUMMY]
     assert design.factors == (("a", "pair", "c", DUMMY) if groups else (*INPUTS, DUMMY))
     assert design.block == len(design.factors) + 1
     assert design.levels.shape == (12 * design.block, 5)
     np.testing.assert_array_equal(design.trajectory, np.repeat(np.arange(12), design.block))
-    scaled = design.levels * (levels - 1)
-    np.testing.assert_allclose(scaled, np.round(scaled), atol=1e-9)
     assert design.levels.min() >= 0.0
     assert design.levels.max() <= 1.0 + 1e-12
-    size = levels / (2.0 * (levels - 1))
+    largest = levels / (2.0 * (levels - 1))
+    sizes = []
     for rows in design.levels.reshape(12, design.block, 5):
         steps = np.diff(rows, axis=0)
         changed = np.abs(steps) > 1e-9
+        size = float(np.abs(steps[changed]).mean())
         np.testing.assert_allclose(np.abs(steps[changed]), size)
+        sizes.append(size)
         seen = [frozenset(np.array(names)[row]) for row in changed]
         expected = [frozenset(groups.get(f, [f])) for f in design.factors]
         assert set(seen) == set(expected)
         assert len(seen) == len(expected)
+    assert 0.5 * largest <= min(sizes) < 0.6 * largest
+    assert 0.85 * largest < max(sizes) <= largest
 
 
 def test_uniforms_span_the_middle_of_the_probabilities() -> None:
-    design = draw_trajectories(INPUTS, {}, 50, 4, 1)
+    design = draw_trajectories(INPUTS, {}, 200, 4, 1)
     expected = TAIL + SPAN * design.levels[:, :4]
     assert TAIL == 0.025
     assert np.abs(design.uniforms - expected).max() <= NUDGE
     assert design.uniforms.min() > 0.02
     assert design.uniforms.max() < 0.98
-    assert np.unique(np.round(design.levels[:, :4] * 3.0)).tolist() == [0.0, 1.0, 2.0, 3.0]
+    # The inputs of a trajectory lie on grids of their own.
+    starts = design.levels[:: design.block, :4]
+    assert len(np.unique(np.round(starts, 6))) == starts.size
+    assert starts.min() < 0.02 and starts.max() > 0.98
+
+
+@pytest.mark.parametrize("levels", [4, 6, 10, 20])
+@pytest.mark.parametrize("period", [1.0 / 3.0, 0.5, 10.0 / 19.0, 2.0 / 3.0])
+def test_no_periodic_input_hides_behind_the_step(levels: int, period: float) -> None:
+    # A sine repeats itself after one Morris step, 10/19 of 20 levels or 2/3 of 4; with steps of
+    # any size its mean size is that of a sine's differences, never near nothing.
+    design = draw_trajectories(INPUTS, {}, 200, levels, 1)
+    found = effects_of(design, np.sin(2.0 * np.pi * design.levels[:, 0] / period), levels=levels)
+    # Of points at random the mean of |sin - sin| is 8 / pi^2, over steps of at most 2/3.
+    assert found.mean_size[0, 0] > 0.8 * (8.0 / np.pi**2) / (2.0 / 3.0)
 
 
 @pytest.mark.parametrize("groups", [{}, GROUPS])
@@ -142,25 +161,31 @@ def test_effects_of_a_linear_function_are_its_slopes_over_the_span(levels: int) 
 
 
 def test_effects_of_a_product_have_their_known_mean_and_spread() -> None:
-    # f = a b: the effect of a is 0.95 u_b, and u_b takes four levels of equal probability: mean
-    # 0.95 * 0.5, variance 0.95^4 (0 + 1/9 + 4/9 + 1 - 4/4) / 4 = 0.95^4 * 5/36. 1,000 trajectories
-    # scatter about the mean by 0.34 / sqrt(1000) = 0.011.
+    # f = a b: the effect of a is 0.95 u_b of mean 0.95 * 0.5. u_b is a place w + s l of a grid of
+    # size s, uniform from 1/2 to 1, that begins at w, uniform up to 1 - s, and has four levels l
+    # of variance 5/36: its variance is E (1 - s)^2 / 12 + E s^2 5/36 with E (1 - s)^2 = 1/12 and
+    # E s^2 = 7/12. 1,000 trajectories scatter about the mean by 0.28 / sqrt(1000) = 0.009.
     design = draw_trajectories(INPUTS, {}, 1000, 4, 2)
     found = effects_of(design, design.uniforms[:, 0] * design.uniforms[:, 1], resamples=10)
     assert found.mean[:2] == pytest.approx([0.475, 0.475], abs=0.04)
     assert found.mean_size[0, :2] == pytest.approx(found.mean[:2], rel=1e-12)
-    assert found.spread[:2] == pytest.approx([SPAN**2 * np.sqrt(5.0 / 36.0)] * 2, rel=0.06)
+    assert found.spread[:2] == pytest.approx(
+        [SPAN**2 * np.sqrt(1.0 / 144.0 + 7.0 / 12.0 * 5.0 / 36.0)] * 2, rel=0.06
+    )
     np.testing.assert_array_equal(found.mean_size[:, 2:4], 0.0)
 
 
 def test_effects_of_a_bowl_have_a_mean_of_nought_and_a_size() -> None:
-    # f = (u - 1/2)^2 on levels 0, 1/3, 2/3, 1: steps 0 to 2/3 and 1/3 to 1 have the effects
-    # -0.95^2 / 3 and 0.95^2 / 3, by (u2 - u1)(u2 + u1 - 1) / (2/3) with u = 0.025 + 0.95 level.
-    design = draw_trajectories(INPUTS, {}, 400, 4, 2)
+    # f = (u - 1/2)^2: a step between places x1 and x2 has the effect 0.95^2 (x1 + x2 - 1). On a
+    # grid of size s from w, levels 0 to 2/3 or 1/3 to 1: |2 w - (1 - s) -+ s/3| on average.
+    def size(w: float, s: float) -> float:
+        return abs(2.0 * w - (1.0 - s) + s / 3.0) / (1.0 - s)
+
+    expected = SPAN**2 * 2.0 * integrate.dblquad(size, 0.5, 1.0, 0.0, lambda s: 1.0 - s)[0]
+    design = draw_trajectories(INPUTS, {}, 2000, 4, 2)
     found = effects_of(design, (design.levels[:, 2] * SPAN + TAIL - 0.5) ** 2)
-    assert found.mean_size[0, 2] == pytest.approx(SPAN**2 / 3.0, rel=1e-9)
-    assert abs(found.mean[2]) < 4.0 * SPAN**2 / 3.0 / np.sqrt(400)
-    assert found.spread[2] == pytest.approx(SPAN**2 / 3.0, rel=0.02)
+    assert found.mean_size[0, 2] == pytest.approx(expected, rel=0.03)
+    assert abs(found.mean[2]) < 4.0 * found.spread[2] / np.sqrt(2000)
 
 
 @pytest.mark.parametrize("levels", [4, 8])
@@ -174,15 +199,15 @@ def test_effects_are_those_computed_step_by_step(levels: int) -> None:
     np.testing.assert_allclose(found.spread, effects.std(axis=0, ddof=1), rtol=1e-9, atol=1e-12)
 
 
-def test_effects_equal_salibs_on_equal_samples() -> None:
-    design = draw_trajectories(INPUTS, {}, 25, 4, 6)
-    outputs = curved(design.uniforms)
+def test_effects_equal_salibs_on_salibs_sample() -> None:
     problem = {"num_vars": 5, "names": [*INPUTS, DUMMY], "bounds": [[0.0, 1.0]] * 5}
+    rows = salib_sample.sample(problem, 25, num_levels=4, seed=6)
+    outputs = curved(rows)
     theirs = salib_morris.analyze(
-        problem, design.levels, outputs, num_resamples=300, num_levels=4,
+        problem, rows, outputs, num_resamples=300, num_levels=4,
         seed=seeds.generator(5, seeds.BOOTSTRAP),
     )  # fmt: skip
-    found = estimate_effects(INPUTS, {}, design.levels, outputs, 4, resamples=300, seed=5)
+    found = estimate_effects(INPUTS, {}, rows, outputs, 4, resamples=300, seed=5)
     np.testing.assert_allclose(found.mean, theirs["mu"], rtol=1e-12)
     np.testing.assert_allclose(found.mean_size[0], theirs["mu_star"], rtol=1e-12)
     np.testing.assert_allclose(found.spread, theirs["sigma"], rtol=1e-12)
@@ -205,7 +230,8 @@ def test_a_group_has_a_size_and_neither_sign_nor_spread() -> None:
     # Campolongo et al. 2007, section 4.2: the size of the change when all members move a step.
     cube = outputs.reshape(40, -1)
     moved = np.abs(np.diff(design.levels[:, 1].reshape(40, -1), axis=1)) > 1e-9
-    sizes = np.abs(np.diff(cube, axis=1))[moved] / (2.0 / 3.0)
+    sizes = np.abs(np.diff(cube, axis=1))[moved]
+    sizes /= np.abs(np.diff(design.levels[:, 1].reshape(40, -1), axis=1))[moved]
     assert sizes.shape == (40,)
     assert found.mean_size[0, place] == pytest.approx(sizes.mean(), rel=1e-9)
     # The interval is 1.96 standard errors of the mean; 200 resamples scatter by about 5 %.
@@ -226,10 +252,10 @@ def test_a_group_of_one_is_that_input() -> None:
 
 @pytest.mark.parametrize("levels", [4, 6])
 def test_the_dummy_of_a_smooth_function_has_no_effect(levels: int) -> None:
-    # Every input moves by two nudges of 1e-4 at most, over a step of p / (2 (p - 1)).
+    # Every input moves by two nudges of 1e-4 at most, over half a step of p / (2 (p - 1)).
     design = draw_trajectories(INPUTS, {}, 30, levels, 1)
     found = effects_of(design, design.uniforms @ SLOPES, levels=levels)
-    limit = 2.0 * NUDGE * np.abs(SLOPES).sum() / (levels / (2.0 * (levels - 1)))
+    limit = 2.0 * NUDGE * np.abs(SLOPES).sum() / (0.5 * levels / (2.0 * (levels - 1)))
     assert found.mean_size[0, -1] <= limit
     assert found.mean_size[0, :4].min() > 100.0 * limit
 

@@ -156,10 +156,12 @@ def _levels(table: pd.DataFrame) -> Array:
 
 def _flags(table: pd.DataFrame, name: str, *, empty: bool = False) -> NDArray[np.bool_]:
     """Return which cases say yes; with ``empty``, one that says nothing says no."""
-    words = table[name].astype(str).str.strip().str.lower()
-    allowed = [*_YES, *_NO, *(("", *_MISSING) if empty else ())]
-    wrong = np.flatnonzero(~words.isin(allowed))
-    if wrong.size:
-        shown = str(table[name].iloc[int(wrong[0])])[:40]
-        raise ValueError(f"column {name!r}, case {wrong[0] + 1}: {shown!r} is neither 0 nor 1")
-    return words.isin(_YES).to_numpy()
+    words = [str(value).strip().lower() for value in table[name]]
+    allowed = {*_YES, *_NO, *(("", *_MISSING) if empty else ())}
+    for k, word in enumerate(words):
+        if word not in allowed:
+            raise ValueError(
+                f"column {name!r}, case {k + 1}: {str(table[name].iloc[k])[:40]!r} is neither 0 "
+                "nor 1"
+            )
+    return np.array([word in _YES for word in words], dtype=bool)

@@ -34,6 +34,9 @@ QUALITY_AT = (0.05, 0.25, 0.5)
 QUALITY_CLASSES = ((0.5, "good"), (1.0, "fair"), (1.5, "marginal"), (np.inf, "unacceptable"))
 """Width of the interval over the stimulus, up to which a curve is called so (ISO/TS 18506)."""
 
+UNFINISHED = 0.01
+"""Standard errors that the search may end short of the greatest likelihood (assumed)."""
+
 
 @dataclass(frozen=True)
 class RiskFit:
@@ -145,6 +148,11 @@ def fit_risk_curve(observations: Observations, family: str) -> RiskFit:
         inverse = np.full((2, 2), np.nan)
     if not (np.all(np.isfinite(inverse)) and np.all(np.diag(inverse) > 0.0)):
         raise ValueError("the cases do not tell where and how fast risk rises: no curve is given")
+    ahead = gradient.sum(axis=1)
+    if ahead @ inverse @ ahead > UNFINISHED**2:
+        raise ValueError(
+            "risk rises so steeply at one stimulus that its slope cannot be told: no curve is given"
+        )
     scaled = inverse if observations.counted else inverse @ (gradient @ gradient.T) @ inverse
     if observations.counted:
         scaled = scaled / weights.mean()

@@ -1,7 +1,7 @@
 """ISO-MME (ISO/TS 13499): crash test data as text, one folder a test."""
 
 from mcstudy.isomme.files import FILTERS, MISSING, Channel, ChannelFile, Test, find_tests, read_test
-from mcstudy.isomme.selection import head_acceleration
+from mcstudy.isomme.selection import HeadSignal, head_acceleration
 from mcstudy.isomme.writing import write_test
 
 __all__ = [
@@ -9,6 +9,7 @@ __all__ = [
     "MISSING",
     "Channel",
     "ChannelFile",
+    "HeadSignal",
     "Test",
     "find_tests",
     "head_acceleration",

@@ -197,7 +197,7 @@ class Test:
                 f"{file.code}: times are those of its sampling interval; the channel of times "
                 f"{other.path.name} differs from them"
                 for other in others
-                if not _is_close(self._reference(other, count), nominal)
+                if self._differs(other, nominal)
             ]
             return nominal, notes
         if len(others) != 1:
@@ -210,6 +210,13 @@ class Test:
         if nominal is not None and not _is_close(time, nominal):
             notes[0] += f", not its sampling interval of {interval:g} s"
         return time, notes
+
+    def _differs(self, file: ChannelFile, time: Array) -> bool:
+        """Return whether a channel of times holds other ones; what is no time says nothing."""
+        try:
+            return not _is_close(self._reference(file, time.size), time)
+        except UserError:
+            return False
 
     def _reference(self, file: ChannelFile, count: int) -> Array:
         """Return the values of a channel of times in s."""
@@ -322,8 +329,8 @@ def _samples(file: ChannelFile) -> Array:
         if text.upper() == MISSING:
             continue
         try:
-            # Python's own underscores between digits are no number elsewhere.
-            values[n] = float(text if "_" not in text else "")
+            # Underscores between digits and digits of other scripts are Python's own.
+            values[n] = float(text if text.isascii() and "_" not in text else "")
         except ValueError:
             hint = " (a decimal comma: write a point)" if re.fullmatch(r"[-+\dEe]+,[-+\dEe]+",
                                                                        text) else ""  # fmt: skip

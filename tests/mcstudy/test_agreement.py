@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from mcstudy.agreement import breaking_inputs, compare, split_variance
+from mcstudy.agreement import breaking_inputs, compare, split_variance, without_rounding
 
 QUIET = settings(derandomize=True, deadline=None, database=None, max_examples=50)
 N = 4000
@@ -145,3 +145,36 @@ def test_nothing_breaks_what_agrees() -> None:
     gains, noise = breaking_inputs(x[:, 0], 2.0 * x[:, 0] + 1.0, x, seed=1)
     np.testing.assert_allclose(gains, 0.0, atol=1e-12)
     assert noise == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_constant_has_no_rank_correlation_and_no_shares() -> None:
+    x = np.random.default_rng(9).random((60, 2))
+    flat = 700.1 * (1.0 + 1e-15 * np.arange(60.0))
+    found = compare(flat, x[:, 0], parts(60, 6))
+    for name in ("correlation", "rank_correlation"):
+        assert np.isnan(getattr(found, name).value)
+    gains, noise = breaking_inputs(flat, x[:, 0], x, seed=1)
+    assert np.isnan([*gains, noise]).all()
+    split = split_variance(np.stack([flat, flat], axis=1), parts(60, 6))
+    assert np.isnan(split.inputs.value)
+    assert split.total == 0.0
+    apart = split_variance(np.stack([flat, 2.0 * flat], axis=1), parts(60, 6))
+    assert apart.method.value == pytest.approx(1.0)
+
+
+@pytest.mark.filterwarnings("error")
+def test_agreement_knows_no_size() -> None:
+    one, two = pair(3, 0.5, 0.2, 1.0, 60)
+    plain = compare(one, two, parts(60, 6))
+    huge = compare(np.ldexp(one, 900), np.ldexp(two, 900), parts(60, 6))
+    assert huge.rank_correlation == plain.rank_correlation
+    assert huge.upper.value == np.ldexp(plain.upper.value, 900)
+
+
+def test_methods_that_rounding_alone_tells_apart_are_equal() -> None:
+    one = np.arange(1.0, 9.0)
+    assert without_rounding(one, one * (1.0 + 1e-15)) is one
+    other = one.copy()
+    other[3] += 1e-6
+    assert without_rounding(one, other) is other

@@ -579,3 +579,32 @@ def test_an_output_that_varies_little_about_a_large_mean_keeps_its_indices() -> 
     a, b = (estimate_indices(part, resamples=0) for part in (blocks, far))
     np.testing.assert_allclose(a.first[0], b.first[0], rtol=1e-6, atol=1e-8)
     np.testing.assert_allclose(a.total[0], b.total[0], rtol=1e-6, atol=1e-8)
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_output_that_rounding_alone_moves_does_not_vary() -> None:
+    rng = np.random.default_rng(1)
+    rows = 700.1 * (1.0 + 1e-15 * rng.integers(0, 5, (4 * 64, 1)))
+    found = estimate_indices(split_blocks(rows, 2, second_order=False), resamples=20)
+    assert found.variance.tolist() == [0.0]
+    assert np.isnan(found.total).all()
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("exponent", [-900, 900])
+def test_indices_do_not_feel_a_power_of_two(exponent: int) -> None:
+    rows = np.random.default_rng(2).normal(size=(4 * 64, 1))
+    one, two = (
+        estimate_indices(split_blocks(values, 2, second_order=False), resamples=20)
+        for values in (rows, np.ldexp(rows, exponent))
+    )
+    np.testing.assert_array_equal(one.total, two.total)
+    assert two.variance[0] > 0.0
+
+
+def test_an_output_that_moves_outside_the_base_points_alone_has_no_index() -> None:
+    rows = np.ones((4 * 64, 1))
+    rows[9] = 5.0
+    found = estimate_indices(split_blocks(rows, 2, second_order=False), resamples=20)
+    assert np.isnan(found.variance).all()
+    assert np.isnan(found.total).all()

@@ -269,3 +269,40 @@ def test_convergence_doubles_the_finite_values() -> None:
         (100, 49.5), (200, 99.5), (400, 199.5), (800, 399.5),
     ]  # fmt: skip
     assert [entry["n"] for entry in statistics.convergence(np.arange(20.0), np.sum)] == [10, 20]
+
+
+# -- values that do not vary, and values of any size ------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("values", "truth"),
+    [
+        ([], False), ([3.0], False), ([3.0, np.nan], False), ([0.0, 0.0], False),
+        ([700.1, 700.1 * (1.0 + 1e-15)], False), ([-700.1, 700.1], True),
+        ([1e9, 1e9 + 0.1], True), ([1e-300, 2e-300], True), ([-1.7e308, 1.7e308], True),
+    ],
+)  # fmt: skip
+def test_values_vary_where_they_differ_by_more_than_rounding(
+    values: list[float], truth: bool
+) -> None:
+    assert statistics.varies(np.array(values, dtype=float)) is truth
+
+
+def test_a_constant_has_no_spread_and_no_interval() -> None:
+    values = 700.1 * (1.0 + 1e-15 * np.arange(20.0))
+    found: Any = statistics.describe(values, np.arange(20) // 5)
+    assert found["sd"]["value"] == 0.0
+    for estimate in (found["mean"], found["sd"], *found["quantiles"].values()):
+        assert np.isnan([estimate["low"], estimate["high"]]).all()
+    assert found["quantiles"]["0.5"]["value"] == pytest.approx(700.1)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("exponent", [-900, 900])
+def test_a_power_of_two_changes_no_digit(exponent: int) -> None:
+    values, groups = np.random.default_rng(3).normal(5.0, 1.0, 80), np.arange(80) // 20
+    plain: Any = statistics.describe(values, groups)
+    scaled: Any = statistics.describe(np.ldexp(values, exponent), groups)
+    for key in ("mean", "sd"):
+        for side in ("value", "low", "high"):
+            assert scaled[key][side] == np.ldexp(plain[key][side], exponent)

@@ -55,6 +55,19 @@ def test_run_status_report_and_resume(tmp_path: Path) -> None:
     assert "12 runs" in rebuilt.stdout
 
 
+def test_modules_of_the_users_own_in_the_working_folder_are_not_imported(tmp_path: Path) -> None:
+    # Workers look for modules in the folder that the study is run from.
+    for name in ("signal", "random", "statistics"):
+        (tmp_path / f"{name}.py").write_text("raise RuntimeError('not this one')")
+    (tmp_path / "small.toml").write_text(SMALL)
+    done = subprocess.run(
+        [Path(sys.executable).parent / "mcstudy", "run", "small.toml", "--out", "out", "--quiet",
+         "--workers", "2"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_an_interrupt_is_told_and_the_same_command_resumes(tmp_path: Path) -> None:
     study, out = tmp_path / "small.toml", tmp_path / "out"
     study.write_text(SMALL.replace("n = 12", "n = 400"))

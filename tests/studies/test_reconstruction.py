@@ -7,7 +7,9 @@ import pytest
 
 from mcstudy.config import Reconstruction, load_study, parse_study
 from mcstudy.errors import UserError
+from mcstudy.isomme import read_test
 from mcstudy.results import ResultsFolder
+from models.criteria import head_injury_criterion
 from studies.reconstruction import reconstruct, write_reconstruction
 
 CASE = Path("configs/paper_case.toml")
@@ -45,6 +47,16 @@ def test_writes_the_whole_folder(study: Reconstruction, tmp_path: Path) -> None:
     analysis = json.loads((folder.path / "analysis.json").read_text())
     assert analysis["outputs"]["hic15"] == pytest.approx(run.outputs["hic15"])
     assert folder.history(0)["head"].shape[0] > 1000
+    # Each impact is a test of its own, whose HIC15 is that of the table; samples have seven digits.
+    for name, output in (("paper_case", "hic15"), ("paper_case_road", "ground_hic15")):
+        test = read_test(folder.path / "iso_mme" / name / f"{name}.mme")
+        head = next(channel for channel in test.channels if channel.code.endswith("ACRA"))
+        found = head_injury_criterion(head.time, head.values, 0.015)[0]
+        assert found == pytest.approx(run.outputs[output], rel=1e-5)
+        assert "a test of its own" in test.header["comments"]
+        assert head.time[0 if "road" in name else -1] == pytest.approx(
+            run.outputs["ground_time"], abs=2e-4
+        )
 
 
 def test_a_table_without_units_for_a_value_is_refused() -> None:

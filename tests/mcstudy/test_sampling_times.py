@@ -1,0 +1,45 @@
+"""Times as files print them."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mcstudy.sampling_times import regular_times
+
+QUIET = settings(derandomize=True, deadline=None, database=None, max_examples=60)
+
+
+@QUIET
+@given(
+    rate=st.sampled_from([12_800.0, 25_600.0, 51_200.0, 65_536.0, 20_000.0 / 3.0, 44_100.0]),
+    digits=st.integers(5, 9),
+    start=st.floats(-2.0, 2.0),
+    count=st.integers(20, 3000),
+)
+def test_times_rounded_to_printed_digits_are_uniform(
+    rate: float, digits: int, start: float, count: int
+) -> None:
+    true = start + np.arange(count) / rate
+    found = regular_times(np.round(true, digits))
+    if 10.0**-digits < 1.0 / rate:
+        steps = np.diff(found)
+        assert np.ptp(steps) < 1e-6 * steps.mean()
+        np.testing.assert_allclose(found, true, atol=0.7 * 10.0**-digits)
+
+
+def test_exact_times_stay_to_the_last_bit() -> None:
+    time = np.arange(-50, 500) / 1e4
+    np.testing.assert_array_equal(regular_times(time), time)
+
+
+@pytest.mark.parametrize("digits", [6, 15])
+def test_times_that_are_not_uniform_stay_as_they_are(digits: int) -> None:
+    jitter = np.random.default_rng(0).uniform(-2e-5, 2e-5, 300)
+    time = np.round(np.arange(300) * 1e-4 + jitter, digits)
+    np.testing.assert_array_equal(regular_times(time), time)
+
+
+def test_a_missing_sample_is_no_rounding() -> None:
+    time = np.delete(np.round(np.arange(300) / 12_800.0, 6), 100)
+    np.testing.assert_array_equal(regular_times(time), time)

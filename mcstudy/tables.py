@@ -47,6 +47,20 @@ class TextTable:
     separator: str
     text: Collection[str] = ()
 
+    def fields(self, name: str) -> list[str]:
+        """Return a column of text.
+
+        Raises
+        ------
+        UserError
+            If there is no such column.
+        """
+        if name not in self.columns:
+            raise UserError(
+                f"{self.path}: has no column {name!r}; it has {', '.join(self.columns)}"
+            )
+        return self.columns[name]
+
     def numbers(
         self, name: str, *, missing: Sequence[str] = (), infinite: bool = False, advice: str = ""
     ) -> Array:
@@ -60,9 +74,9 @@ class TextTable:
         Raises
         ------
         UserError
-            Naming the line of a field that is no number.
+            If there is no such column, or a field is no number; the message names its line.
         """
-        fields = self.columns[name]
+        fields = self.fields(name)
         comma = self.separator != "," and self._decimal_commas()
         column = np.full(len(fields), np.nan)
         for k, field in enumerate(fields):

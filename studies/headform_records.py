@@ -3,13 +3,21 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mcstudy import units
-from mcstudy.measured import Measured
-from models.headform.identification import check_uniform
-from models.headform.record import first_impact
+from mcstudy.measured import Measured, Signal
+from models.criteria.filters import settling_time
+from models.headform.identification import CHANNEL_CLASS, check_uniform
+from models.headform.record import Impact, first_impact
+
+Array = NDArray[np.float64]
 
 ACCELERATION = "head_acceleration"
+RISEN = 0.03
+"""Share of the peak from which on a signal has risen (assumed)."""
+LEAD = 0.25
+"""Share of a filter's settling time that a record begins before its signal rises (assumed)."""
 
 
 def keep_first_impacts(data: Measured) -> Measured:
@@ -31,8 +39,24 @@ def keep_first_impacts(data: Measured) -> Measured:
             scale = units.factor("g", data.header.signals[ACCELERATION].unit)
             own[ACCELERATION] = np.stack([found.time, scale * found.acceleration], axis=1)
             notes.setdefault(name, []).extend(found.notes)
+            notes[name] += _beginning(found, data.header.signals[ACCELERATION])
         signals[name] = own
     return replace(data, signals=signals, notes=notes)
+
+
+def _beginning(impact: Impact, signal: Signal) -> list[str]:
+    """Return what to say of a filtered record that begins too late to hold first contact."""
+    if not 0.0 < signal.channel_class < CHANNEL_CLASS:
+        return []
+    risen = int(np.argmax(impact.acceleration >= RISEN * impact.acceleration.max()))
+    lead = float(impact.time[risen] - impact.time[0])
+    if lead > LEAD * settling_time(signal.channel_class):
+        return []
+    return [
+        f"the record begins {1e3 * lead:.1f} ms before the {signal.filter} signal rises: what the "
+        "filter answers before contact is not in it, and penetration and intervals are not to be "
+        "relied on; give the record from before contact"
+    ]
 
 
 def note_lines(data: Measured) -> list[str]:
@@ -40,7 +64,7 @@ def note_lines(data: Measured) -> list[str]:
     return [f"test {name}: {line}" for name, lines in data.notes.items() for line in lines]
 
 
-def _is_uniform(time: np.ndarray) -> bool:
+def _is_uniform(time: Array) -> bool:
     try:
         check_uniform(time)
     except ValueError:

@@ -119,7 +119,7 @@ def load_corridors(name: str) -> dict[str, Corridor]:
         raise ValueError(f"corridor must be a name or the path of a file, given {name!r}")
     try:
         if name.endswith(".toml"):
-            table = tomllib.loads(Path(name).read_text(encoding="utf-8"))
+            table = tomllib.loads(Path(name).read_text(encoding="utf-8-sig"))
         elif name in data.names("corridors"):
             table = data.load(f"corridors/{name}.toml")
         else:

@@ -38,12 +38,12 @@ LONELY = 0.25
 """Share of a spike by which its neighbours may differ from each other."""
 FEWEST_QUIET = 20
 """Samples between a disturbance and contact that are kept as quiet, if there are so many."""
-FLAT, SHOULDER = 3, 0.95
-"""Equal largest readings that may be a plateau, and the share of the peak whose duration they are
-compared with."""
-CLIPPED = 0.5
-"""Share of that duration from which on equal readings are a clipped peak: of a round peak they are
-a tenth (assumed)."""
+TOP, SHOULDER = 0.99, 0.95
+"""Shares of the peak whose durations tell a plateau from a round peak (assumed)."""
+CLIPPED = 0.7
+"""Their ratio from which on a peak seems clipped: of a parabola it is 0.45 (assumed)."""
+FEWEST_FLAT = 4
+"""Samples that a plateau has at least."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def first_impact(time: ArrayLike, acceleration: ArrayLike, speed: float) -> Impa
     """
     t = np.asarray(time, dtype=np.float64)
     a = np.array(acceleration, dtype=np.float64)
-    if t.size < FLAT or not (np.all(np.isfinite(a)) and speed > 0.0):
+    if t.size < FEWEST_FLAT or not (np.all(np.isfinite(a)) and speed > 0.0):
         return Impact(t, a, ())
     step = float(t[-1] - t[0]) / (t.size - 1)
     notes = _remove_spikes(t, a, step)
@@ -192,12 +192,11 @@ def _events(a: Array, step: float, speed: float) -> list[_Event]:
 def _clipping(t: Array, a: Array) -> str:
     """Return what to say of a peak that looks clipped, or nothing."""
     top = float(a.max())
-    flat = int(np.sum(a == top))
-    near = int(np.sum(a >= SHOULDER * top))
-    if flat < FLAT or flat < CLIPPED * near:
+    flat = a >= TOP * top
+    if flat.sum() < FEWEST_FLAT or flat.sum() < CLIPPED * np.sum(a >= SHOULDER * top):
         return ""
     return (
-        f"the largest reading, {top:.4g} g, stands in {flat} samples from "
-        f"{1e3 * t[int(np.argmax(a == top))]:.1f} ms on: the sensor or its record seems clipped, "
-        "peak and HIC are too low, penetration is too large"
+        f"the largest reading, {top:.4g} g, stands for {flat.sum()} samples from "
+        f"{1e3 * t[int(np.argmax(flat))]:.1f} ms on: the sensor or its record seems clipped, peak "
+        "and HIC are too low, penetration is too large"
     )

@@ -14,6 +14,7 @@ import numpy as np
 from mcstudy.config import InjuryStudy, parse_study
 from mcstudy.figures import diagnosis as figures_of
 from mcstudy.figures import risk, style
+from mcstudy.files import read_study_text
 from mcstudy.injury.cases import read_parquet
 from mcstudy.progress import say
 from mcstudy.report import Section, Table
@@ -58,7 +59,7 @@ def run_demo(
     make_tests(data, [Hidden("hood_bottoming", "catalogue", hidden)], seed)
     say(f"18 headform tests in {data}")
     answer = diagnose(data, ResultsFolder(out / "diagnosis"), workers=workers, quiet=False)
-    text = study_file.read_text(encoding="utf-8")
+    text = read_study_text(study_file)
     texts = {"base": text, "extended": extension.extend(text, answer["parameters"])}
     injuries = {}
     for name, content in texts.items():

@@ -8,6 +8,7 @@ from typing import Any
 from mcstudy import config
 from mcstudy.config import CommonStudy, ModelComparison, SampledStudy, load_study
 from mcstudy.errors import UserError
+from mcstudy.files import read_study_text
 from mcstudy.inputs import Distribution
 from mcstudy.measured import HEADER, Measured
 from models.registry import load_model, model_names
@@ -61,7 +62,7 @@ def choose_model(data: Measured, file: Path | None) -> ModelChoice:
         if isinstance(chosen, ModelComparison):
             raise UserError(f"{file}: a model-comparison has several models; give a study of one")
         study = chosen
-        text = file.read_text(encoding="utf-8")
+        text = read_study_text(file)
         if study.model.name != header.model:
             raise UserError(
                 f"{file}: model.name is {study.model.name!r}, but the data are of {header.model!r}"

@@ -18,6 +18,7 @@ from scipy.optimize import least_squares
 from mcstudy.errors import UserError
 from mcstudy.figures import style
 from mcstudy.figures.panels import Curve, Panel, draw_panels
+from mcstudy.tables import read_csv
 from mcstudy.text import number
 from models.contact.law import ForceCurve
 from models.contact.loading import choose_knots, fit_loading
@@ -136,12 +137,10 @@ def _hic(impact: _Impact) -> float:
 
 
 def _read(path: Path) -> list[_Impact]:
-    try:
-        table = pd.read_csv(path)
-        groups = [part for _, part in table[list(COLUMNS)].astype(float).groupby(COLUMNS[0])]
-    except (OSError, ValueError, KeyError) as error:
-        raise UserError(f"{path}: cannot be read ({error})") from None
-    if len(groups) < 3 or not np.isfinite(table[list(COLUMNS)].to_numpy()).all():
+    text = read_csv(path)
+    table = pd.DataFrame({name: text.numbers(name) for name in COLUMNS})
+    groups = [part for _, part in table.groupby(COLUMNS[0])]
+    if len(groups) < 3 or not np.isfinite(table.to_numpy()).all():
         raise UserError(f"{path}: must hold three tests or more, all of them numbers")
     impacts = []
     for part in groups:

@@ -9,12 +9,11 @@ import math
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
-from mcstudy.errors import UserError
 from mcstudy.figures import style
 from mcstudy.figures.panels import Curve, Panel, draw_panels, use_log_scale
+from mcstudy.tables import read_csv
 from mcstudy.text import number
 from models.protocol import complete_status
 from models.registry import load_model
@@ -45,12 +44,10 @@ def validate(workers: int, measured: Path) -> Part:
         missing = f"Not run: {FILE} is not in the folder of measured data (option --measured)."
         keys = ("ground_hic_median", "ground_hic_range", "ground_hic_crash")
         return Part("Impact on the road", (missing,), [check(key, math.nan) for key in keys])
-    try:
-        table = pd.read_csv(path)
-        measured_hic = np.sort(table["hic15"].to_numpy(dtype=float))
-        child = table.loc[table["dummy"] == "Q3", "hic15"].to_numpy(dtype=float)
-    except (OSError, ValueError, KeyError) as error:
-        raise UserError(f"{path}: cannot be read ({error})") from None
+    table = read_csv(path, text=("dummy", "struck"))
+    hic = table.numbers("hic15")
+    measured_hic = np.sort(hic)
+    child = hic[np.array(table.fields("dummy")) == "Q3"]
     crashes = sweep(
         [{**CENTRAL, "facing_angle": side, "gait_phase": float(phase)}
          for phase in PHASES for side in SIDES],

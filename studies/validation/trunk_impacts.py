@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from mcstudy.errors import UserError
 from mcstudy.figures import style
 from mcstudy.figures.panels import Curve, Panel, draw_panels
+from mcstudy.tables import read_csv
 from mcstudy.text import number
 from models.component.blunt_impact import strike_region
 from models.pedestrian.anthropometry import build_body
@@ -87,12 +88,14 @@ def _key(name: str, speed: float) -> str:
 
 
 def _read(path: Path) -> pd.DataFrame:
+    text = read_csv(path, text=("region", "cadaver", "sex"))
+    numbers = pd.DataFrame({name: text.numbers(name) for name in COLUMNS})
     try:
-        table = pd.read_csv(path)
-        numbers = table[list(COLUMNS)].astype(float)
-        region = table["region"].map(lambda r: REGIONS[r][0])
-    except (OSError, ValueError, KeyError) as error:
-        raise UserError(f"{path}: cannot be read ({error})") from None
+        region = [REGIONS[name][0] for name in text.fields("region")]
+    except KeyError as error:
+        raise UserError(
+            f"{path}: column 'region': {error} is none of {', '.join(REGIONS)}"
+        ) from None
     if not np.isfinite(numbers.to_numpy()).all():
         raise UserError(f"{path}: {', '.join(COLUMNS)} must be numbers in every row")
     return numbers.assign(region=region)

@@ -143,6 +143,12 @@ def test_a_clipped_sensor_is_told(limit: float) -> None:
     assert f"{limit:g} g" in note
 
 
+@pytest.mark.parametrize("channel_class", [600.0, 1000.0])
+def test_a_clipped_sensor_behind_a_filter_is_told(channel_class: float) -> None:
+    values = filtered(np.minimum(record(0.3), 100.0), RATE, channel_class)
+    assert any("clipped" in note for note in first_impact(TIME, values, SPEED).notes)
+
+
 @pytest.mark.parametrize("digits", [0, 1, 2])
 @pytest.mark.parametrize("rate", [5_000.0, 10_000.0, 50_000.0])
 def test_a_round_peak_is_no_plateau(rate: float, digits: int) -> None:

@@ -84,6 +84,14 @@ def test_a_low_class_is_fitted_through_its_filter(tmp_path: Path, name: str) -> 
     assert f"have passed {name}" in (tmp_path / "out" / "report.html").read_text()
 
 
+def test_a_filtered_record_that_begins_at_contact_is_told(tmp_path: Path) -> None:
+    late = TIME >= 0.0
+    source = folder_of(tmp_path / "data", filtered(pulse(TIME[late]), RATE, 60.0), "CFC60",
+                       TIME[late])  # fmt: skip
+    analysis = fitted(tmp_path, source)
+    assert any("give the record from before contact" in note for note in analysis["notes"])
+
+
 def test_a_clipped_sensor_is_told(tmp_path: Path) -> None:
     values = np.minimum(pulse(TIME), 100.0)
     analysis = fitted(tmp_path, folder_of(tmp_path / "data", values))

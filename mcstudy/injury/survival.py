@@ -29,11 +29,18 @@ from mcstudy.statistics import REACH
 Array = NDArray[np.float64]
 
 FAMILIES = ("log-normal", "log-logistic", "Weibull")
+NARROW = 1e-6
+"""Width in ln x below which an interval is taken as a density times its width (assumed)."""
 QUALITY_AT = (0.05, 0.25, 0.5)
 """Risks at which the quality index is given (ISO/TS 18506)."""
 QUALITY_CLASSES = ((0.5, "good"), (1.0, "fair"), (1.5, "marginal"), (np.inf, "unacceptable"))
 """Width of the interval over the stimulus, up to which a curve is called so (ISO/TS 18506)."""
 
+NARROWEST = 1e-5
+"""Spread of ln x below which stimuli differ by rounding alone (assumed)."""
+STEEPEST = 1e4
+"""Slope in ln x from which on risk jumps, all within 0.1 % of a stimulus (assumed)."""
+_TOO_STEEP = "risk jumps at one stimulus, and its slope cannot be told: no curve is given"
 UNFINISHED = 0.01
 """Standard errors that the search may end short of the greatest likelihood (assumed)."""
 
@@ -117,12 +124,21 @@ def fit_risk_curve(observations: Observations, family: str) -> RiskFit:
     with np.errstate(divide="ignore"):
         low, high = np.log(observations.low), np.log(observations.high)
     exact, weights = observations.exact, observations.weights
+    # Of the two bounds of a narrow interval no digits are left of their difference in risk: it is
+    # the density in its middle times its width.
+    held = np.isfinite(high) & np.isfinite(low)
+    span = np.where(held, observations.high - observations.low, np.inf)
+    span = np.log1p(span / np.where(held, observations.low, 1.0))
+    narrow = ~exact & (span < NARROW)
+    point = exact | narrow
     y = np.log(observations.stimulus)
-    middle, width = float(y.mean()), float(y.std()) or 1.0
+    middle, spread = float(y.mean()), float(y.std())
+    width = spread if spread > NARROWEST else 1.0
 
     # Centred and scaled, so that the two parameters hardly depend on each other; the weights to a
     # mean of one, so that the search ends at the same place whatever they count.
-    cases = _Cases((low - middle) / width, (high - middle) / width, exact,
+    place = np.where(narrow, 0.5 * (low + high), high)
+    cases = _Cases((low - middle) / width, (place - middle) / width, point,
                    weights / weights.mean())  # fmt: skip
 
     def loss(p: Array) -> tuple[float, Array]:
@@ -150,18 +166,19 @@ def fit_risk_curve(observations: Observations, family: str) -> RiskFit:
         raise ValueError("the cases do not tell where and how fast risk rises: no curve is given")
     ahead = gradient.sum(axis=1)
     if ahead @ inverse @ ahead > UNFINISHED**2:
-        raise ValueError(
-            "risk rises so steeply at one stimulus that its slope cannot be told: no curve is given"
-        )
+        raise ValueError(_TOO_STEEP)
     scaled = inverse if observations.counted else inverse @ (gradient @ gradient.T) @ inverse
     if observations.counted:
         scaled = scaled / weights.mean()
     # Back to ln x: z = a + b (y - middle) / width.
     back = np.array([[1.0, -middle / width], [0.0, 1.0 / width]])
     intercept, slope = back @ best
+    if slope > STEEPEST:
+        raise ValueError(_TOO_STEEP)
     # The density of an exact case is one in x, not in the scaled ln x.
     total *= weights.mean()
-    total -= float(weights[exact] @ (np.log(width) + np.log(observations.high[exact])))
+    total -= float(weights[exact] @ (np.log(width) + high[exact]))
+    total += float(weights[narrow] @ np.log(span[narrow] / width))
     return RiskFit(
         family, float(intercept), float(slope), back @ scaled @ back.T, total, observations.size
     )
@@ -169,7 +186,7 @@ def fit_risk_curve(observations: Observations, family: str) -> RiskFit:
 
 @dataclass(frozen=True)
 class _Cases:
-    """Bounds (n,) in scaled ln x, which are exact (n,), weights (n,)."""
+    """Bounds (n,) in scaled ln x, the upper that of exact cases (n,), which these are, weights."""
 
     low: Array
     high: Array

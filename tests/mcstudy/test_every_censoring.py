@@ -122,6 +122,18 @@ def test_every_shape_has_the_curve_of_greatest_likelihood(family: str, shape, n:
     assert np.all(np.isfinite(fit.covariance))
 
 
+@pytest.mark.parametrize("family", FAMILIES)
+def test_intervals_of_any_width_are_continuous(family: str) -> None:
+    # Three onsets known to one part in 10^4 to 10^14: the curve is that of exact ones.
+    x = np.array([5.0, 6.0, 7.5, 9.0])
+    exact = fit_risk_curve(Observations(x, x.copy()), family)
+    for width in 10.0 ** np.arange(-4.0, -15.0, -1.0):
+        fit = fit_risk_curve(Observations(x, x * (1.0 + width)), family)
+        assert fit.slope == pytest.approx(exact.slope, rel=2e-3)
+        known = float(np.log(x * (1.0 + width) - x).sum())
+        assert fit.log_likelihood - known == pytest.approx(exact.log_likelihood, abs=5e-3)
+
+
 # -- influence --------------------------------------------------------------------------------
 
 

@@ -35,11 +35,13 @@ def keep_first_impacts(data: Measured) -> Measured:
         if ACCELERATION in own and speed is not None and _is_uniform(own[ACCELERATION][:, 0]):
             angle = data.input_value("impact_angle", row, "rad") or (0.0, 0.0)
             time, values = data.signal(name, ACCELERATION, "g")
-            found = first_impact(time, values, speed[0] * float(np.cos(angle[0])))
-            scale = units.factor("g", data.header.signals[ACCELERATION].unit)
+            signal = data.header.signals[ACCELERATION]
+            reach = settling_time(signal.channel_class) if signal.channel_class > 0.0 else 0.0
+            found = first_impact(time, values, speed[0] * float(np.cos(angle[0])), reach)
+            scale = units.factor("g", signal.unit)
             own[ACCELERATION] = np.stack([found.time, scale * found.acceleration], axis=1)
             notes.setdefault(name, []).extend(found.notes)
-            notes[name] += _beginning(found, data.header.signals[ACCELERATION])
+            notes[name] += _beginning(found, signal)
         signals[name] = own
     return replace(data, signals=signals, notes=notes)
 

@@ -22,6 +22,10 @@ SHORTEST = 0.002
 """s that an impact lasts at least (assumed)."""
 LEVEL = 0.1
 """Share of the largest average from which on an event counts."""
+FOOT = 0.01
+"""Share of the largest average from which on an event that reaches the level has begun."""
+LONGEST_FOOT = 0.005
+"""s that this may take at most: a drift is no event (assumed)."""
 SLOWEST = 0.05
 """s in which an impact takes a quarter of the speed at least: a softer rise is none (assumed)."""
 MOST = 0.5
@@ -71,13 +75,16 @@ class _Event:
     peak: float
 
 
-def first_impact(time: ArrayLike, acceleration: ArrayLike, speed: float) -> Impact:
+def first_impact(
+    time: ArrayLike, acceleration: ArrayLike, speed: float, reach: float = 0.0
+) -> Impact:
     """Return the first impact of a record.
 
     Parameters
     ----------
     time : (n,) s, uniform. acceleration : (n,) g, finite, against the motion.
     speed : m/s, before the impact.
+    reach : s by which the signal's filter answers before and after an event.
 
     Notes
     -----
@@ -88,6 +95,7 @@ def first_impact(time: ArrayLike, acceleration: ArrayLike, speed: float) -> Impa
     if t.size < FEWEST_FLAT or not (np.all(np.isfinite(a)) and speed > 0.0):
         return Impact(t, a, ())
     step = float(t[-1] - t[0]) / (t.size - 1)
+    around = round(max(reach, WINDOW) / step)
     notes = _remove_spikes(t, a, step)
     base = _base(a)
     events = _events(a - base, step, speed)
@@ -112,15 +120,15 @@ def first_impact(time: ArrayLike, acceleration: ArrayLike, speed: float) -> Impa
             f"a disturbance of {event.peak:.3g} g {1e3 * t[event.start]:.1f} ms, before the "
             "impact, is left out"
         )
-        reach = event.stop + round(WINDOW / step)
-        if own.start - reach >= FEWEST_QUIET:
-            first = reach
+        begin, end = event.start - around, event.stop + around
+        if own.start - end >= FEWEST_QUIET:
+            first = end
         else:
-            a[event.start : min(reach, own.start)] = base
+            a[max(begin, 0) : min(end, own.start)] = base
     for event in later:
         if event.speed < SIZEABLE * speed:
             continue
-        last = max(own.stop, event.start - round(WINDOW / step))
+        last = max(own.stop, event.start - around)
         notes.append(
             f"a later impact of {event.peak:.3g} g {1e3 * t[event.start]:.1f} ms is left out, with "
             "all that follows"
@@ -174,19 +182,31 @@ def _events(a: Array, step: float, speed: float) -> list[_Event]:
     level = min(LEVEL * float(smooth.max()), 0.25 * speed / (STANDARD_GRAVITY * SLOWEST))
     if not level > 0.0:
         return []
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], smooth > level, [0]]).astype(int)))
-    runs = edges.reshape(-1, 2)
+    runs = _stretches(smooth > level)
     joined: list[list[int]] = []
-    for start, stop in runs.tolist():
+    for start, stop in runs:
         if joined and (start - joined[-1][1]) * step < GAP:
             joined[-1][1] = stop
         else:
             joined.append([start, stop])
+    # A soft one has begun before it reaches the level.
+    foot = _stretches(smooth > FOOT * smooth.max())
+    for k, (start, _) in enumerate(joined):
+        free = joined[k - 1][1] + 1 if k else 0
+        begun = next((begin for begin, end in foot if begin <= start < end), start)
+        joined[k][0] = max(begun, free, start - round(LONGEST_FOOT / step))
     return [
         _Event(start, stop, STANDARD_GRAVITY * step * float(a[start:stop].sum()),
                float(a[start:stop].max()))
         for start, stop in joined
     ]  # fmt: skip
+
+
+def _stretches(inside: NDArray[np.bool_]) -> list[list[int]]:
+    """Return first sample and end of each stretch of samples that are inside."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside, [0]]).astype(int)))
+    found: list[list[int]] = edges.reshape(-1, 2).tolist()
+    return found
 
 
 def _clipping(t: Array, a: Array) -> str:

@@ -96,6 +96,13 @@ def test_a_second_impact_in_a_filtered_record(channel_class: float) -> None:
     assert_is_the_first(found, channel_class, rel=0.01)
 
 
+@pytest.mark.parametrize("drift", [3.0, -3.0, 8.0])
+def test_a_drift_between_two_impacts_joins_them_not(drift: float) -> None:
+    # The sensor comes back to another zero after the impact.
+    values = record(0.5) + np.where(TIME > 0.018, drift, 0.0) + 2.0 * pulse(TIME - 0.2)
+    assert_is_the_first(first_impact(TIME, values, SPEED), rel=0.01)
+
+
 # -- disturbances before contact --------------------------------------------------------------
 
 

@@ -27,7 +27,7 @@ FOOT = 0.01
 LONGEST_FOOT = 0.005
 """s that this may take at most: a drift is no event (assumed)."""
 SLOWEST = 0.05
-"""s in which an impact takes a quarter of the speed at least: a softer rise is none (assumed)."""
+"""s in which an impact takes half of the speed at least: a softer rise is none (assumed)."""
 MOST = 0.5
 """Share of the speed that an impact takes at least; a rebound takes more than all of it."""
 STOPPED = 0.97
@@ -179,7 +179,7 @@ def _base(a: Array) -> float:
 def _events(a: Array, step: float, speed: float) -> list[_Event]:
     """Return the stretches in which the averaged signal is up, in order."""
     smooth = _averaged(a, step)
-    level = min(LEVEL * float(smooth.max()), 0.25 * speed / (STANDARD_GRAVITY * SLOWEST))
+    level = min(LEVEL * float(smooth.max()), 0.5 * speed / (STANDARD_GRAVITY * SLOWEST))
     if not level > 0.0:
         return []
     runs = _stretches(smooth > level)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from mcstudy import seeds
-from mcstudy.statistics import REACH, Estimate, between_replicates
+from mcstudy.statistics import REACH, ROUNDING, Estimate, between_replicates, scale_of, varies
 
 Array = NDArray[np.float64]
 Parts = NDArray[np.int64]
@@ -27,6 +27,8 @@ DUMMIES = 20
 @dataclass(frozen=True)
 class Agreement:
     """How a method's values go with a reference method's on the same inputs.
+
+    Correlations are NaN where a method's values do not vary beyond rounding.
 
     Attributes
     ----------
@@ -54,6 +56,8 @@ class Agreement:
 class VarianceSplit:
     """Shares of an output's variance over methods, equally weighted, and inputs; they sum to 1.
 
+    They are NaN where the output does not vary beyond rounding.
+
     Attributes
     ----------
     method : of the methods' means. inputs : of the mean over the methods. together : of what the
@@ -65,6 +69,12 @@ class VarianceSplit:
     inputs: Estimate
     together: Estimate
     total: float
+
+
+def without_rounding(reference: Array, method: Array) -> Array:
+    """Return a method's values, the reference's where all of them differ by rounding alone."""
+    size = np.maximum(np.abs(reference), np.abs(method))
+    return reference if np.all(np.abs(method - reference) <= ROUNDING * size) else method
 
 
 def compare(reference: Array, method: Array, parts: Parts) -> Agreement:
@@ -89,6 +99,9 @@ def compare(reference: Array, method: Array, parts: Parts) -> Agreement:
     if reference.size < 3:
         raise ValueError(f"a comparison takes three pairs or more, given {reference.size}")
     both = np.stack([reference, method], axis=1)
+    # Squares of scaled values neither overflow nor vanish.
+    scale = scale_of(both)
+    both = both / scale
 
     def known(statistic: Callable[[Array], float]) -> Estimate:
         return _between(statistic, both, parts)
@@ -98,17 +111,17 @@ def compare(reference: Array, method: Array, parts: Parts) -> Agreement:
         return Estimate(statistic(both), float(np.tanh(found.low)), float(np.tanh(found.high)))
 
     lower, upper = known(lambda p: _limit(p, -REACH)), known(lambda p: _limit(p, REACH))
-    difference = method - reference
+    difference = both[:, 1] - both[:, 0]
     outside = (difference < lower.value) | (difference > upper.value)
     return Agreement(
         pairs=int(reference.size),
         correlation=correlated(_pearson),
         rank_correlation=correlated(_spearman),
         concordance=correlated(_concordance),
-        bias=known(lambda p: float(np.mean(p[:, 1] - p[:, 0]))),
-        spread=known(lambda p: float(np.std(p[:, 1] - p[:, 0], ddof=1))),
-        lower=lower,
-        upper=upper,
+        bias=known(lambda p: float(np.mean(p[:, 1] - p[:, 0]))).times(scale),
+        spread=known(lambda p: float(np.std(p[:, 1] - p[:, 0], ddof=1))).times(scale),
+        lower=lower.times(scale),
+        upper=upper.times(scale),
         outside=float(outside.mean()),
         slope=known(_slope),
     )
@@ -127,7 +140,12 @@ def split_variance(values: Array, parts: Parts) -> VarianceSplit:
     With ``Y(m, x)``: ``V = Var_m(E_x Y) + Var_x(E_m Y) + rest``. The spread of the methods' means
     is corrected for the sampling of the inputs, and an estimate below zero is zero.
     """
-    total = float(np.sum(_components(values)))
+    if not varies(values):
+        unknown = Estimate(np.nan, np.nan, np.nan)
+        return VarianceSplit(unknown, unknown, unknown, 0.0)
+    scale = scale_of(values)
+    values = values / scale
+    total = scale * scale * float(np.sum(_components(values)))
 
     def share(k: int) -> Estimate:
         def statistic(part: Array) -> float:
@@ -155,11 +173,17 @@ def breaking_inputs(
     gains : (d,) rank correlation with the mean difference of ranks along each input taken out,
         less the one as it is.
     noise : the largest gain of twenty dummies.
+
+    Notes
+    -----
+    There is no correlation to gain where a method does not vary: all are NaN then.
     """
+    if not (varies(reference) and varies(method)):
+        return np.full(inputs.shape[1], np.nan), np.nan
     one, two = stats.rankdata(reference), stats.rankdata(method)
     rng = seeds.generator(seed, seeds.AGREEMENT)
     columns = np.column_stack([inputs, rng.random((reference.size, DUMMIES))])
-    plain = float(np.corrcoef(one, two)[0, 1])
+    plain = _pearson(np.stack([one, two], axis=1))
     gains = np.array([_without(one, two, column) - plain for column in columns.T])
     d = inputs.shape[1]
     return gains[:d], float(gains[d:].max())
@@ -171,7 +195,7 @@ def _without(one: Array, two: Array, column: Array) -> float:
     taken = np.empty_like(two)
     for part in np.array_split(order, BINS):
         taken[part] = two[part] - (two[part] - one[part]).mean()
-    return float(np.corrcoef(one, taken)[0, 1])
+    return _pearson(np.stack([one, taken], axis=1))
 
 
 def _components(values: Array) -> Array:
@@ -199,21 +223,25 @@ def _inside(value: float) -> float:
 
 
 def _pearson(pair: Array) -> float:
-    if np.ptp(pair[:, 0]) == 0.0 or np.ptp(pair[:, 1]) == 0.0:
+    if not (varies(pair[:, 0]) and varies(pair[:, 1])):
         return np.nan
     return float(np.corrcoef(pair[:, 0], pair[:, 1])[0, 1])
 
 
 def _spearman(pair: Array) -> float:
+    # Ranks of what differs by rounding alone would tell it apart.
+    if not (varies(pair[:, 0]) and varies(pair[:, 1])):
+        return np.nan
     return _pearson(np.stack([stats.rankdata(column) for column in pair.T], axis=1))
 
 
 def _concordance(pair: Array) -> float:
     one, two = pair[:, 0], pair[:, 1]
-    scale = one.var() + two.var() + (one.mean() - two.mean()) ** 2
-    if scale == 0.0:
+    # Constants have no correlation of any kind, however far apart they are.
+    if not (varies(one) or varies(two)):
         return np.nan
-    return float(2.0 * np.mean((one - one.mean()) * (two - two.mean())) / scale)
+    apart = one.var() + two.var() + (one.mean() - two.mean()) ** 2
+    return float(2.0 * np.mean((one - one.mean()) * (two - two.mean())) / apart)
 
 
 def _limit(pair: Array, reach: float) -> float:
@@ -223,7 +251,7 @@ def _limit(pair: Array, reach: float) -> float:
 
 def _slope(pair: Array) -> float:
     middle, difference = pair.mean(axis=1), pair[:, 1] - pair[:, 0]
-    spread = float(middle.var())
-    if spread == 0.0:
+    if not varies(middle):
         return np.nan
+    spread = float(middle.var())
     return float(np.mean((middle - middle.mean()) * (difference - difference.mean())) / spread)

@@ -207,7 +207,8 @@ def map_inputs(study: SampledStudy, model: Simulator, uniforms: Array) -> dict[s
     columns: dict[str, Array] = {}
     for item in model.inputs:
         if item.name in sampled:
-            values = sampled[item.name] * scale[item.name]
+            with np.errstate(over="ignore"):
+                values = sampled[item.name] * scale[item.name]
             bad = ~((values >= item.low) & (values <= item.high))
             if bad.any():
                 worst = values[bad][0]
@@ -261,9 +262,11 @@ def report_outputs(study: SampledStudy, model: Simulator) -> list[str]:
 
 
 def check_outputs(names: Sequence[str], model: Simulator, place: str) -> None:
-    """Raise ``UserError`` if the model lacks one of the outputs."""
+    """Raise ``UserError`` if the model lacks one of the outputs, or one is named twice."""
     known = [item.name for item in model.outputs]
     for name in names:
+        if names.count(name) > 1:
+            raise UserError(f"{place}: names {name!r} twice")
         if name not in known:
             raise UserError(
                 f"{place}: model {model.name!r} has no output {name!r}; it has {', '.join(known)}"

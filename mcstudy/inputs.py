@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 SMALLEST_SHARE = 1e-20
 """Probability below which a truncation that leaves no more counts as a mistake (assumed)."""
 
+_ABSURD = np.errstate(all="ignore")
+"""Of parameters beyond what numbers can hold come infinity and NaN, outside every model's range."""
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 Unit = Annotated[str, AfterValidator(units.canonical)]
 """A unit, whatever its spelling; one that no quantity has is refused where it is used."""
@@ -60,6 +62,7 @@ class Uniform(_Distribution):
             raise ValueError(f"low ({self.low:g}) must be below high ({self.high:g})")
         return self
 
+    @_ABSURD
     def quantile(self, u: Array, given: Mapping[str, Array]) -> Array:
         """Return the values at probabilities ``u``."""
         return self.low + (self.high - self.low) * u
@@ -79,6 +82,7 @@ class Triangular(_Distribution):
             raise ValueError("low, mode and high must rise")
         return self
 
+    @_ABSURD
     def quantile(self, u: Array, given: Mapping[str, Array]) -> Array:
         """Return the values at probabilities ``u``."""
         width = self.high - self.low
@@ -131,6 +135,7 @@ class _Scored(_Truncated):
     @abstractmethod
     def _value(self, score: Array) -> Array: ...
 
+    @_ABSURD
     def quantile(self, u: Array, given: Mapping[str, Array]) -> Array:
         """Return the values at probabilities ``u``."""
         low = -np.inf if self.low is None else self._score(self.low)
@@ -145,6 +150,7 @@ class Normal(_Scored):
     mean: FiniteFloat
     sd: Positive
 
+    @_ABSURD
     def _score(self, value: float) -> float:
         return (value - self.mean) / self.sd
 
@@ -159,6 +165,7 @@ class LogNormal(_Scored):
     median: Positive
     sigma: Positive
 
+    @_ABSURD
     def _score(self, value: float) -> float:
         return float(np.log(value / self.median) / self.sigma) if value > 0.0 else -np.inf
 
@@ -194,6 +201,7 @@ class GrowthChart(_Truncated):
         """The age input."""
         return (self.age,)
 
+    @_ABSURD
     def quantile(self, u: Array, given: Mapping[str, Array]) -> Array:
         """Return the values at probabilities ``u`` and the ages ``given``.
 
@@ -222,8 +230,7 @@ class GrowthChart(_Truncated):
 
         z = self._between(u, score(self.low, -np.inf), score(self.high, np.inf))
         inside = np.maximum(1.0 + L * S * z, 0.0)
-        with np.errstate(divide="ignore"):
-            values = M * np.where(curved, inside ** (1.0 / power), np.exp(S * z))
+        values = M * np.where(curved, inside ** (1.0 / power), np.exp(S * z))
         return self._bounded(values)
 
 

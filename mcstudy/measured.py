@@ -38,6 +38,10 @@ HEADER = "measured.toml"
 EMPTY = "leave a field empty where nothing was measured"
 FEWEST_SAMPLES = 8
 """Samples below which a signal cannot be used."""
+FINEST, COARSEST = 1e-8, 1.0
+"""s between samples that a recorder of a crash can have (assumed)."""
+LARGEST = 1e9
+"""Number above which a sample of a signal, in whatever unit, is a mistake (assumed)."""
 
 
 class _Table(BaseModel):
@@ -234,8 +238,24 @@ def _series(path: Path, frame: pd.DataFrame, name: str) -> Array:
     if back.any():
         line = frame.index[given[int(np.argmax(back)) + 1]]
         raise UserError(f"{path}: line {line}: time must rise")
+    _check_samples(f"{path}: column {name!r}", table[:, 0], table[:, 1])
     table[:, 0] = regular_times(table[:, 0])
     return table
+
+
+def _check_samples(place: str, time: Array, values: Array) -> None:
+    """Refuse times and values that no recorder has, and with which nothing can be computed."""
+    step = float(time[-1] - time[0]) / (time.size - 1)
+    if not FINEST <= step <= COARSEST:
+        raise UserError(
+            f"{place}: its samples lie {step:.3g} s apart, {FINEST:g} to {COARSEST:g} s are "
+            "possible: times must be in s"
+        )
+    if np.any(np.diff(time) <= 0.0):
+        raise UserError(f"{place}: its times are larger than their steps can be told")
+    worst = float(values[np.argmax(np.abs(values))])
+    if abs(worst) > LARGEST:
+        raise UserError(f"{place}: holds {worst:.3g}, no sample is above {LARGEST:g}")
 
 
 def _frame(table: TextTable) -> pd.DataFrame:
@@ -274,6 +294,7 @@ def _from_isomme(folder: Path, tests: Sequence[isomme.Test], channels: Sequence[
                 f"{test.path}: {channel.code} holds {channel.time.size} samples, {FEWEST_SAMPLES} "
                 "are needed"
             )
+        _check_samples(f"{test.path}: {channel.code}", channel.time, channel.values)
         filters.add(channel.filter)
         rows.append({"test": test.name, "impact_speed": speed, "headform_mass": mass})
         signals[test.name] = {

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mcstudy.config import ModelComparison, Reconstruction, Study, load_study
+from mcstudy.config import ModelComparison, Reconstruction, Study, load_study, parse_study
 from mcstudy.errors import UserError
+from mcstudy.files import read_study_text
 from mcstudy.report import Table
 from mcstudy.results import ResultsFolder
 from mcstudy.workers import Workers
@@ -98,11 +99,11 @@ def run_study(
     StudyError
         If too many runs failed.
     """
-    study = load_study(path)
+    text = read_study_text(path)
+    study = parse_study(text, str(path))
     if study.kind not in PIPELINES:
         raise UserError(f"{path}: kind {study.kind!r} is run by 'mcstudy reconstruct'")
     folder = results_folder(study, out)
-    text = Path(path).read_text(encoding="utf-8")
     PIPELINES[study.kind].run(study, text, folder, workers=workers, quiet=quiet)
     return folder
 
@@ -149,12 +150,13 @@ def run_case(
     StudyError
         If the run failed.
     """
-    study = load_study(path)
+    text = read_study_text(path)
+    study = parse_study(text, str(path))
     if not isinstance(study, Reconstruction):
         raise UserError(f"{path}: kind {study.kind!r} is run by 'mcstudy run'")
     folder = results_folder(study, out)
     run, tables = reconstruct(study)
-    write_reconstruction(study, Path(path).read_text(encoding="utf-8"), run, tables, folder)
+    write_reconstruction(study, text, run, tables, folder)
     return run, tables, folder
 
 

@@ -76,7 +76,9 @@ def fit_tests(data: Measured, *, knots: int = 6, quiet: bool = True) -> list[Fit
     names = [str(name) for name in data.tests["test"]]
     for row, name in enumerate(follow(names, "tests fitted", quiet=quiet)):
         try:
-            fitted.append(_fit_test(data, row, name, knots))
+            # Of absurd tests come no finite numbers, which are told, not warned of.
+            with np.errstate(all="ignore"):
+                fitted.append(_fit_test(data, row, name, knots))
         except ValueError as error:
             raise UserError(f"{data.source}: test {name}: {error}") from None
     return fitted

@@ -10,6 +10,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from mcstudy.figures import style
+from mcstudy.statistics import varies
 
 Array = NDArray[np.float64]
 
@@ -39,7 +40,7 @@ def draw_pairs(
         axes = figure.subplots(2, len(values), squeeze=False)
         for k, (name, pair) in enumerate(values.items()):
             held = pair[np.isfinite(pair).all(axis=1)]
-            _scatter(axes[0, k], held, labels, found[name])
+            _scatter(axes[0, k], held, found[name])
             axes[0, k].set_title(style.words(name))
             for axis, label in (("x", labels[0]), ("y", labels[1])):
                 unit = style.label(name, units[name])
@@ -51,17 +52,21 @@ def draw_pairs(
         return figure
 
 
-def _scatter(axes: Axes, pair: Array, labels: tuple[str, str], found: Mapping[str, Any]) -> None:
+def _scatter(axes: Axes, pair: Array, found: Mapping[str, Any]) -> None:
     axes.scatter(pair[:, 0], pair[:, 1], s=7, color=style.BLUE, alpha=0.35, linewidths=0)
-    low, high = np.quantile(pair, [0.002, 0.998])
-    reach = 0.06 * (high - low)
-    ends = (low - reach, high + reach)
+    ends = style.ends_of(_inner(pair), below=0.06, above=0.06)
     axes.plot(ends, ends, color="black", linewidth=1.0, linestyle="--", label="equal")
     axes.set(xlim=ends, ylim=ends, aspect="equal")
     rank = found["rank_correlation"]
-    text = f"rank correlation {_spanned(rank)}"
+    text = "no rank correlation" if rank["value"] is None else f"rank correlation {_spanned(rank)}"
     axes.plot([], [], linestyle="none", label=text)
     axes.legend(loc="upper left", fontsize=8, framealpha=0.9, handlelength=1.2)
+
+
+def _inner(values: Array) -> tuple[float, float]:
+    """Return between which values all but the outermost 0.2 % at either end lie."""
+    low = np.quantile(values, 0.002, method="lower")
+    return float(low), float(np.quantile(values, 0.998, method="higher"))
 
 
 def _spanned(estimate: Mapping[str, Any]) -> str:
@@ -84,12 +89,9 @@ def _limits(axes: Axes, pair: Array, found: Mapping[str, Any]) -> None:
         if entry["low"] is not None and entry["high"] is not None:
             axes.axhspan(entry["low"], entry["high"], color=style.RED, alpha=0.12, linewidth=0)
     axes.axhline(0.0, color="black", linewidth=0.8)
-    low, high = np.quantile(difference, [0.002, 0.998])
-    span = max(high, found["upper"]["value"], 0.0) - min(low, found["lower"]["value"], 0.0)
-    axes.set_ylim(
-        min(low, found["lower"]["value"], 0.0) - 0.08 * span,
-        max(high, found["upper"]["value"], 0.0) + 0.28 * span,
-    )
+    lines = [found["lower"]["value"], found["upper"]["value"], 0.0]
+    axes.set_ylim(*style.ends_of([*_inner(difference), *lines], below=0.08, above=0.28))
+    axes.set_xlim(*style.ends_of(pair.mean(axis=1)))
     axes.legend(loc="upper left", fontsize=8, framealpha=0.9)
 
 
@@ -98,15 +100,21 @@ def draw_variance(split: Mapping[str, Mapping[str, Any]]) -> Figure:
 
     Parameters
     ----------
-    split : ``method``, ``inputs`` and ``together`` (value, low, high) by output.
+    split : ``method``, ``inputs`` and ``together`` (value, low, high) by output, none where it does
+        not vary.
     """
     with style.styled():
         figure = style.new_figure(7.2, 0.62 * len(split) + 1.5)
         axes = figure.subplots()
         places = np.arange(len(split))[::-1]
         left = np.zeros(len(split))
+        for place, entry in zip(places, split.values(), strict=True):
+            if entry["inputs"]["value"] is None:
+                axes.barh(place, 1.0, 0.62, color="#F4F4F4", edgecolor="#C4C4C4", hatch="///",
+                          linewidth=0.0)  # fmt: skip
+                axes.text(0.5, place, "does not vary", ha="center", va="center", fontsize=9)
         for key, (label, colour) in _SHARES.items():
-            shares = np.array([entry[key]["value"] for entry in split.values()])
+            shares = np.array([entry[key]["value"] or 0.0 for entry in split.values()])
             axes.barh(places, shares, 0.62, left=left, color=colour, label=label)
             for place, start, share in zip(places, left, shares, strict=True):
                 if share >= 0.045:
@@ -128,13 +136,21 @@ def draw_breaking(breaking: Mapping[str, Mapping[str, Any]]) -> Figure:
 
     Parameters
     ----------
-    breaking : ``gains`` by input and ``noise`` by output.
+    breaking : ``gains`` by input and ``noise`` by output, none where there is no rank correlation.
     """
     count = len(next(iter(breaking.values()))["gains"])
     with style.styled():
         figure = style.new_figure(4.3 * len(breaking), 0.27 * count + 1.5)
         row = figure.subplots(1, len(breaking), squeeze=False)[0]
         for axes, (name, entry) in zip(row, breaking.items(), strict=True):
+            axes.set_title(style.words(name))
+            axes.tick_params(axis="y", length=0)
+            axes.grid(visible=False, axis="y")
+            if entry["noise"] is None:
+                axes.text(0.5, 0.5, "no rank correlation:\nit does not vary", ha="center",
+                          va="center", transform=axes.transAxes)  # fmt: skip
+                axes.set(xticks=[], yticks=[])
+                continue
             order = sorted(entry["gains"], key=lambda k: entry["gains"][k])
             gains = [entry["gains"][key] for key in order]
             colours = [style.BLUE if gain > entry["noise"] else "#B9C6CF" for gain in gains]
@@ -143,12 +159,12 @@ def draw_breaking(breaking: Mapping[str, Mapping[str, Any]]) -> Figure:
                          label="noise line (dummies)")  # fmt: skip
             axes.axvline(0.0, color="black", linewidth=0.8)
             axes.set_yticks(np.arange(count), [style.words(key) for key in order])
-            axes.tick_params(axis="y", length=0)
-            axes.grid(visible=False, axis="y")
-            axes.set_title(style.words(name))
             axes.set_xlabel("gain in rank correlation [–]")
-        handles, labels = row[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", fontsize=9)
+        handles, labels = next(
+            (found for axes in row if (found := axes.get_legend_handles_labels())[0]), ([], [])
+        )
+        if handles:
+            figure.legend(handles, labels, loc="outside upper center", fontsize=9)
         return figure
 
 
@@ -178,8 +194,13 @@ def draw_along(
                 axes.fill_between(middle, low, high, color=colour, alpha=0.18, linewidth=0)
             axes.set(xlabel=label, ylabel=style.label(name, units[name]))
             axes.xaxis.set_major_locator(MaxNLocator(5))
-            low, high = axes.get_ylim()
-            axes.set_ylim(low, high + 0.22 * (high - low))
+            if not varies(x[held]):
+                axes.set_xlim(*style.ends_of(x[held]))
+            if varies(pair[held]):
+                low, high = axes.get_ylim()
+                axes.set_ylim(low, high + 0.22 * (high - low))
+            else:
+                axes.set_ylim(*style.ends_of(pair[held]))
             axes.legend(loc="upper left", fontsize=8, framealpha=0.9)
         return figure
 

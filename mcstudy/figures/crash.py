@@ -141,12 +141,13 @@ def draw_history(
             axes.plot(
                 1e3 * time[shown],
                 values[shown],
-                label=name,
+                label=style.safe(name),
                 color=style.PALETTE[k % len(style.PALETTE)],
             )
         for name, at in (marks or {}).items():
             if at <= until:
-                axes.axvline(1e3 * at, color=style.GREY, linestyle="--", linewidth=1.0, label=name)
+                axes.axvline(1e3 * at, color=style.GREY, linestyle="--", linewidth=1.0,
+                             label=style.safe(name))  # fmt: skip
         axes.set(xlabel="time after first contact [ms]", ylabel=ylabel, xlim=(0.0, 1e3 * until))
         axes.set_ylim(bottom=0.0)
         if len(channels) > 1 or marks:

@@ -83,7 +83,7 @@ def draw_map(where: Mapping[str, Any], labels: Mapping[str, str], regime: str) -
                 names.append(f"{first['low']:.3g} to {first['high']:.3g}")
             axes.set_yticks(rows[:-1] + 0.5, names)
             axes.set(xlabel="time from the begin of the pulse [ms]", ylabel=regime,
-                     title=labels[channel])  # fmt: skip
+                     title=style.safe(labels[channel]))  # fmt: skip
             axes.grid(visible=False)
             figure.colorbar(mesh, ax=axes, label="measured above simulated\n[standard errors]")
         return figure

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mcstudy.figures import style
+from mcstudy.statistics import varies
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,13 @@ class Mark:
     value: float
     label: str
     kind: str
+
+    def shown_with(self, values: np.ndarray) -> str:
+        """Return the label in a legend; it tells of a mark too far from values to be drawn."""
+        label = style.safe(self.label)
+        if style.is_near(values, self.value):
+            return label
+        return f"{label}\n({self.value:.3g}, beyond the picture)"
 
 
 _MARK_STYLE: dict[str, dict[str, Any]] = {
@@ -61,33 +69,49 @@ def draw_distributions(
 def _histogram(
     axes: Axes, values: np.ndarray, analysis: Mapping[str, Any], marks: Sequence[Mark]
 ) -> None:
-    # The last half per cent on either side would squeeze the rest.
-    low, high = np.quantile(values, [0.002, 0.998])
-    points = [mark.value for mark in marks]
-    low, high = min([low, *points]), max([high, *points])
-    pad = 0.03 * (high - low)
+    # The last 0.2 per cent on either side would squeeze the rest.
+    low = np.quantile(values, 0.002, method="lower")
+    high = np.quantile(values, 0.998, method="higher")
     shown = values[(values >= low) & (values <= high)]
-    sns.histplot(x=shown, bins=40, ax=axes, color=style.SKY, edgecolor="white", linewidth=0.3)
-    quantiles = analysis["quantiles"]
+    if varies(shown):
+        sns.histplot(x=shown, bins=40, ax=axes, color=style.SKY, edgecolor="white", linewidth=0.3)
+        _interval(axes, analysis["quantiles"])
+    else:
+        share = "all" if shown.size == values.size else f"{shown.size:,} of"
+        said = f"{shown[0]:,.4g} in {share} {values.size:,} runs"
+        axes.vlines(shown[0], 0.0, shown.size, color=style.SKY, linewidth=4.0, label=said)
+        axes.set_ylim(bottom=0.0)
+    for mark in marks:
+        drawn = {"label": mark.shown_with(shown), "linewidth": 1.6, **_MARK_STYLE[mark.kind]}
+        if style.is_near(shown, mark.value):
+            axes.axvline(mark.value, **drawn)
+        else:
+            axes.plot([], [], **drawn)
+    ends = style.ends_of(shown, [mark.value for mark in marks], below=0.03, above=0.03)
+    axes.set_xlim(*ends)
+    room = 1.0 / (1.0 - style.covered(axes, 2.6))
+    axes.set_ylim(top=axes.get_ylim()[1] * max(room, 1.45))
+    axes.legend(loc="upper right", frameon=True, framealpha=0.9, fontsize=8)
+
+
+def _interval(axes: Axes, quantiles: Mapping[str, Mapping[str, Any]]) -> None:
+    """Draw the central 90 % and the median with its interval."""
     central = (quantiles["0.05"]["value"], quantiles["0.95"]["value"])
     axes.axvspan(*central, color=style.BLUE, alpha=0.10, label="central 90 %", zorder=0)
     median = quantiles["0.5"]
     axes.axvline(median["value"], color=style.BLUE, label="median, 95 % interval")
     if median["low"] is not None and median["high"] is not None:
         axes.axvspan(median["low"], median["high"], color=style.BLUE, alpha=0.35, linewidth=0)
-    for mark in marks:
-        axes.axvline(mark.value, label=mark.label, linewidth=1.6, **_MARK_STYLE[mark.kind])
-    axes.set_xlim(low - pad, high + pad)
-    axes.set_ylim(top=axes.get_ylim()[1] * 1.45)
-    axes.legend(loc="upper right", frameon=True, framealpha=0.9, fontsize=8)
 
 
 def _cumulative(axes: Axes, values: np.ndarray, marks: Sequence[Mark]) -> None:
-    ordered = np.sort(values)
-    share = np.arange(1, ordered.size + 1) / ordered.size
+    # From one end of the axis to the other, or a value that all runs share would show no step.
+    low, high = axes.get_xlim()
+    ordered = np.concatenate([[min(low, values.min())], np.sort(values), [max(high, values.max())]])
+    share = np.concatenate([np.arange(values.size + 1) / values.size, [1.0]])
     axes.step(ordered, share, color=style.BLUE, where="post")
     # Dvoretzky-Kiefer-Wolfowitz band: holds for the whole curve at once.
-    band = np.sqrt(np.log(2.0 / 0.05) / (2.0 * ordered.size))
+    band = np.sqrt(np.log(2.0 / 0.05) / (2.0 * values.size))
     axes.fill_between(
         ordered,
         np.clip(share - band, 0.0, 1.0),
@@ -98,5 +122,6 @@ def _cumulative(axes: Axes, values: np.ndarray, marks: Sequence[Mark]) -> None:
         linewidth=0,
     )
     for mark in marks:
-        axes.axvline(mark.value, linewidth=1.6, **_MARK_STYLE[mark.kind])
+        if low <= mark.value <= high:
+            axes.axvline(mark.value, linewidth=1.6, **_MARK_STYLE[mark.kind])
     axes.set_ylim(0.0, 1.0)

@@ -19,7 +19,7 @@ def draw_failures(shares: Mapping[str, Sequence[float]]) -> Figure:
         figure = style.new_figure(8.6, 0.3 * len(table) + 1.6)
         axes = figure.subplots()
         sns.heatmap(
-            table.rename(index=style.words), ax=axes,
+            table.rename(index=style.quantity), ax=axes,
             cmap=sns.light_palette(style.RED, as_cmap=True), vmin=0.0,
             vmax=max(1.0, float(np.nanmax(table.to_numpy()))), linewidths=0.5,
             cbar_kws={"label": "failed runs [%]"},

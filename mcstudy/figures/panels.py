@@ -83,14 +83,15 @@ def _draw(axes: Axes, panel: Panel) -> None:
     for band in panel.bands:
         axes.fill_between(
             band.x, band.low, band.high, color=band.colour, alpha=0.2, linewidth=0,
-            label=band.label,
+            label=_label(band),
         )  # fmt: skip
     for curve in panel.curves:
         axes.plot(
             curve.x, curve.y, color=curve.colour, linestyle=curve.line or "none",
-            marker=curve.marker or None, markersize=3.5, label=curve.label,
+            marker=curve.marker or None, markersize=3.5, label=_label(curve),
         )  # fmt: skip
-    axes.set(xlabel=panel.xlabel, ylabel=panel.ylabel, title=panel.title)
+    axes.set(xlabel=panel.xlabel, ylabel=panel.ylabel)
+    axes.set_title(style.safe(panel.title) if panel.title else "")
     if panel.xlim is not None:
         axes.set_xlim(*panel.xlim)
     if panel.ylim is not None:
@@ -98,3 +99,8 @@ def _draw(axes: Axes, panel: Panel) -> None:
     labels = [curve.label for curve in panel.curves] + [band.label for band in panel.bands]
     if any(labels):
         axes.legend(fontsize=8, framealpha=0.9, loc=panel.legend)
+
+
+def _label(drawn: Curve | Band) -> str | None:
+    """Return what the legend says of a curve or band, if anything."""
+    return style.safe(drawn.label) if drawn.label else None

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from mcstudy.figures import style
 from mcstudy.figures.distributions import Mark
+from mcstudy.statistics import varies
 
 
 def draw_correlations(correlations: pd.DataFrame, noise: float) -> Figure:
@@ -18,17 +19,19 @@ def draw_correlations(correlations: pd.DataFrame, noise: float) -> Figure:
 
     Parameters
     ----------
-    correlations : rows inputs, columns outputs. noise : |rho| below which 95 % of unrelated
-        inputs fall; such cells are printed grey.
+    correlations : rows inputs, columns outputs, NaN where there is none.
+    noise : |rho| below which 95 % of unrelated inputs fall; such cells are printed grey.
     """
     with style.styled():
         figure = style.new_figure(
-            1.35 * len(correlations.columns) + 2.6, 0.36 * len(correlations) + 1.6
+            # As high as the label of the colours is long, at least.
+            1.35 * len(correlations.columns) + 2.6,
+            max(0.36 * len(correlations) + 1.6, 3.2),
         )
         axes = figure.subplots()
-        named = correlations.rename(index=style.words, columns=style.words)
+        values = correlations.to_numpy(dtype=float)
         sns.heatmap(
-            named,
+            correlations.astype(float).rename(index=style.quantity, columns=style.quantity),
             ax=axes,
             cmap=sns.diverging_palette(240, 30, s=85, l=50, as_cmap=True),
             vmin=-1.0,
@@ -39,9 +42,10 @@ def draw_correlations(correlations: pd.DataFrame, noise: float) -> Figure:
             annot_kws={"fontsize": 8},
             cbar_kws={"label": "Spearman rank correlation [–]"},
         )
-        for text, value in zip(axes.texts, named.to_numpy().ravel(), strict=True):
+        for text, value in zip(axes.texts, values[np.isfinite(values)], strict=True):
             if abs(value) < noise:
                 text.set_color("#A0A0A0")
+        style.mark_missing(axes, np.isnan(values))
         axes.set(xlabel="", ylabel="")
         axes.tick_params(axis="x", rotation=35, length=0)
         axes.tick_params(axis="y", rotation=0, length=0)
@@ -65,15 +69,20 @@ def draw_against_input(
             part = runs[[column, name]].dropna()
             axes.scatter(part[column], part[name], s=6, color=style.SKY, alpha=0.45, linewidths=0)
             _band(axes, part[column].to_numpy(), part[name].to_numpy())
+            outputs = part[name].to_numpy(dtype=float)
+            shown = outputs[outputs <= np.quantile(outputs, 0.998, method="higher")]
+            points = [mark.value for mark in marks.get(name, ())]
             for mark in marks.get(name, ()):
                 colour = {"observed": style.RED, "limit": "black"}.get(mark.kind, style.GREEN)
                 axes.axhline(
-                    mark.value, color=colour, linewidth=1.3, label=mark.label, linestyle="--"
-                )
-            top = float(np.quantile(part[name], 0.998))
-            axes.set_ylim(top=1.25 * top)
+                    mark.value, color=colour, linewidth=1.3, label=mark.shown_with(shown),
+                    linestyle="--",
+                )  # fmt: skip
+            room = 1.0 / (1.0 - style.covered(axes, 3.0)) - 1.0
+            axes.set_ylim(*style.ends_of(shown, points, above=max(room, 0.3)))
             axes.set(xlabel=input_label, ylabel=style.label(name, unit))
-            axes.legend(loc="upper left", fontsize=8, framealpha=0.9)
+            if axes.get_legend_handles_labels()[0]:
+                axes.legend(loc="upper left", fontsize=8, framealpha=0.9)
         return figure
 
 
@@ -89,6 +98,8 @@ def _band(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
             middle.append(float(np.median(x[inside])))
             for into, p in ((low, 0.05), (centre, 0.5), (high, 0.95)):
                 into.append(float(np.quantile(y[inside], p)))
+    if not middle:
+        return
     axes.plot(middle, centre, color=style.BLUE, label="running median")
     axes.fill_between(
         middle, low, high, color=style.BLUE, alpha=0.18, linewidth=0, label="5 to 95 %"
@@ -117,7 +128,7 @@ def draw_joint(
             linewidths=0,
             label="runs",
         )
-        if len(part) > 50:
+        if len(part) > 50 and _spreads(part.to_numpy(dtype=float)):
             sns.kdeplot(
                 data=part, x=first[0], y=second[0], ax=axes, levels=[0.1, 0.5], color=style.BLUE,
                 linewidths=1.3,
@@ -129,21 +140,32 @@ def draw_joint(
                 edgecolors="white", label="accident", zorder=5,
             )  # fmt: skip
         axes.set(xlabel=style.label(*first), ylabel=style.label(*second))
-        axes.set_ylim(top=part[second[0]].max() + 0.22 * np.ptp(part[second[0]]))
+        held = part[second[0]].to_numpy(dtype=float)
+        axes.set_ylim(*style.ends_of(held, [point[k] for k in (second[0],) if k in point],
+                                     above=0.22))  # fmt: skip
         axes.legend(loc="upper left", fontsize=8, framealpha=0.9)
         return figure
+
+
+def _spreads(pair: np.ndarray) -> bool:
+    """Tell whether points lie in a plane, not on a line or in one place."""
+    if not (varies(pair[:, 0]) and varies(pair[:, 1])):
+        return False
+    return bool(abs(np.corrcoef(pair.T)[0, 1]) < 1.0 - 1e-9)
 
 
 def draw_convergence(
     tables: Mapping[str, Sequence[Mapping[str, float]]], units: Mapping[str, str]
 ) -> Figure:
-    """Return the medians over growing parts of the study."""
+    """Return the medians over growing parts of the study, of which each output has one or more."""
     with style.styled():
         figure = style.new_figure(4.4 * len(tables), 2.9)
         row = figure.subplots(1, len(tables), squeeze=False)[0]
         for axes, (name, table) in zip(row, tables.items(), strict=True):
             n = [entry["n"] for entry in table]
-            axes.plot(n, [entry["value"] for entry in table], "o-", color=style.BLUE)
+            values = [entry["value"] for entry in table]
+            axes.plot(n, values, "o-", color=style.BLUE)
+            axes.set_ylim(*style.ends_of(values))
             axes.set_xscale("log", base=2)
             axes.set_xticks(n, [f"{int(k)}" for k in n])
             axes.minorticks_off()

@@ -40,8 +40,8 @@ def draw_risk_curve(analysis: Mapping[str, Any], xlabel: str, title: str) -> Fig
                   linestyle="--", label="without a family (Turnbull)")  # fmt: skip
         _draw_lines(axes, analysis["at"])
         _draw_rug(axes, analysis["rug"])
-        axes.set(xlim=(0.0, float(x[-1])), ylim=(-0.06, 1.06), title=title)
-        axes.set_xlabel(xlabel)
+        axes.set(xlim=(0.0, float(x[-1])), ylim=(-0.06, 1.06), title=style.safe(title, 70))
+        axes.set_xlabel(style.safe(xlabel, 70))
         axes.set_ylabel("risk [–]")
         axes.legend(loc="center right", fontsize=8)
         return figure
@@ -51,7 +51,7 @@ def _draw_lines(axes: Axes, points: Mapping[str, Mapping[str, Any]]) -> None:
     for risk, entry in points.items():
         p, at = float(risk), float(entry["value"])
         axes.plot([0.0, at, at], [p, p, -0.06], color=style.GREY, linewidth=0.8, linestyle=":")
-        shown = f"{at:,.0f}" if at >= 10 else f"{at:.2g}"
+        shown = f"{at:,.0f}" if 10.0 <= at < 1e6 else f"{at:.2g}"
         axes.annotate(f"{100 * p:g} %: {shown}", (0.0, p), xytext=(4, 2), fontsize=8,
                       textcoords="offset points", color=style.GREY)  # fmt: skip
 
@@ -88,11 +88,12 @@ def draw_levels(
             for level, risk in levels.items():
                 above.plot(x, risk, color=LEVEL_COLOURS[level - 1], linestyle=dashes[k % 4],
                            linewidth=1.5, label=f"AIS{level}+, {title}")  # fmt: skip
-        below.hist(stimulus, bins=60, density=True, color=style.SKY, range=(0.0, float(x[-1])))
-        if limit is not None:
+        # Counts have the density's shape, and none is too large to be drawn.
+        below.hist(stimulus, bins=60, color=style.SKY, range=(0.0, float(x[-1])))
+        if limit is not None and 0.0 <= limit <= x[-1]:
             for axes in (above, below):
                 axes.axvline(limit, color="black", linewidth=1.0, linestyle="--")
-            above.text(limit, 1.02, f" limit {limit:,.0f}", fontsize=8)
+            above.text(limit, 1.02, f" limit {limit:,.6g}", fontsize=8)
         above.set(ylim=(0.0, 1.08), ylabel="risk [–]", xlim=(0.0, float(x[-1])))
         below.set_xlabel(xlabel)
         below.set_ylabel("density of runs")
@@ -121,10 +122,11 @@ def draw_speed_risk(
             colour = style.PALETTE[k % len(style.PALETTE)]
             axes.fill_between(entry["speed"], entry["low"], entry["high"], color=colour, alpha=0.2,
                               linewidth=0)  # fmt: skip
-            axes.plot(entry["speed"], entry["risk"], color=colour, linewidth=1.8, label=label)
+            axes.plot(entry["speed"], entry["risk"], color=colour, linewidth=1.8,
+                      label=style.safe(label))  # fmt: skip
         for k, (label, (speed, risk)) in enumerate(published.items()):
             axes.plot(speed, risk, color=style.GREY, linestyle=DASHES[k % len(DASHES)],
-                      linewidth=1.2, label=label)  # fmt: skip
+                      linewidth=1.2, label=style.safe(label))  # fmt: skip
         axes.set(ylim=(0.0, 1.0), title=title)
         axes.set_xlabel("impact speed [km/h]")
         axes.set_ylabel("risk [–]")
@@ -151,7 +153,7 @@ def draw_ais(shares: Mapping[str, Sequence[float]]) -> Figure:
                     axes.text(start + width / 2, place, f"{100 * width:.0f} %", fontsize=7,
                               ha="center", va="center", color=colour)  # fmt: skip
             left = left + table[:, level]
-        axes.set_yticks(places, list(shares))
+        axes.set_yticks(places, [style.safe(label, 30) for label in shares])
         axes.set(xlim=(0.0, 1.0), xlabel="share of outcomes [–]")
         axes.grid(visible=False, axis="y")
         figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=7,
@@ -177,7 +179,7 @@ def draw_roc(
         axes.plot([0, 1], [0, 1], color=style.GREY, linewidth=0.8, linestyle=":")
         for k, (title, (x, y)) in enumerate(curves.items()):
             colour = style.PALETTE[k % len(style.PALETTE)]
-            axes.plot(x, y, color=colour, label=title)
+            axes.plot(x, y, color=colour, label=style.safe(title))
             alarm, hit = marks[title]
             axes.plot(alarm, hit, "o", color=colour, markeredgecolor="black", markersize=7)
         axes.plot([], [], "o", color="white", markeredgecolor="black", label=label)
@@ -208,10 +210,15 @@ def draw_exceedance(samples: Mapping[str, Array], xlabel: str, limit: float) -> 
             colour = style.PALETTE[k % len(style.PALETTE)]
             axes.fill_between(held, np.clip(share - reach, 0, 1), np.clip(share + reach, 0, 1),
                               step="post", color=colour, alpha=0.18, linewidth=0)  # fmt: skip
-            axes.step(held, share, where="post", color=colour, label=label)
+            axes.step(held, share, where="post", color=colour, label=style.safe(label))
             largest = max(largest, float(np.quantile(held, 0.995)))
-        axes.axvline(limit, color="black", linewidth=1.0, linestyle="--", label=f"limit {limit:g}")
-        axes.set(xlim=(0.0, 1.05 * max(largest, limit)), ylim=(0.0, 1.0))
+        line: dict[str, Any] = {"color": "black", "linewidth": 1.0, "linestyle": "--"}
+        if style.is_near([largest], limit):
+            axes.axvline(limit, label=f"limit {limit:g}", **line)
+            largest = max(largest, limit)
+        else:
+            axes.plot([], [], label=f"limit {limit:g}, beyond the picture", **line)
+        axes.set(xlim=(0.0, 1.05 * largest or 1.0), ylim=(0.0, 1.0))
         axes.set_xlabel(xlabel)
         axes.set_ylabel("share of the runs above [–]")
         axes.legend(fontsize=8)

@@ -51,7 +51,7 @@ def draw_ranking(axes: Axes, table: Mapping[str, Mapping[str, Any]], noise: floa
     )  # fmt: skip
     axes.axvline(noise, color="black", linestyle="--", linewidth=1.0, label="noise line (dummy)")
     axes.axvline(0.0, color="black", linewidth=0.8)
-    axes.set_yticks(places, [style.words(name) for name in order])
+    axes.set_yticks(places, [style.quantity(name) for name in order])
     axes.tick_params(axis="y", length=0)
     axes.grid(visible=False, axis="y")
 
@@ -74,7 +74,7 @@ def draw_elementary_effects(outputs: Mapping[str, Mapping[str, Any]]) -> Figure:
             heights = _spread_labels(size[:named], spread[:named], 0.4 * top, 0.05 * top)
             for k in range(named):
                 axes.annotate(
-                    style.words(order[k]), (size[k], spread[k]), fontsize=7, va="center",
+                    style.quantity(order[k]), (size[k], spread[k]), fontsize=7, va="center",
                     xytext=(size[k] + 0.025 * top, heights[k]),
                 )  # fmt: skip
             axes.set(xlim=(0.0, 1.3 * top), ylim=(0.0, 1.05 * top), title=style.words(name))

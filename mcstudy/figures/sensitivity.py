@@ -49,8 +49,10 @@ def _bars(axes: Axes, entry: Mapping[str, Any], dummy: str) -> None:
             error_kw={"elinewidth": 1.0, "capsize": 1.5},
         )  # fmt: skip
     noise = entry["total"][dummy]["high"]
-    axes.axvline(noise, color="black", linestyle="--", linewidth=1.0, label="noise line (dummy)")
-    axes.set_yticks(places, [style.words(name) for name in order])
+    if noise is not None:
+        axes.axvline(noise, color="black", linestyle="--", linewidth=1.0,
+                     label="noise line (dummy)")  # fmt: skip
+    axes.set_yticks(places, [style.quantity(name) for name in order])
     axes.tick_params(axis="y", length=0)
     axes.axvline(0.0, color="black", linewidth=0.8)
     axes.set_xlabel(_SHARE)
@@ -63,7 +65,7 @@ def column(table: Mapping[str, Mapping[str, Any]], order: Sequence[str], key: st
 
 
 def draw_heatmap(outputs: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """Return total indices of all outputs by factor."""
+    """Return total indices of all outputs by factor; hatched: of an output that does not vary."""
     table = pd.DataFrame(
         {
             name: {factor: row["value"] for factor, row in entry["total"].items()}
@@ -72,14 +74,19 @@ def draw_heatmap(outputs: Mapping[str, Mapping[str, Any]]) -> Figure:
         dtype=float,
     ).T
     with style.styled():
-        figure = style.new_figure(0.62 * table.shape[1] + 3.4, 0.34 * table.shape[0] + 1.6)
+        figure = style.new_figure(
+            0.62 * table.shape[1] + 3.4,
+            # As high as the label of the colours is long, at least.
+            max(0.34 * table.shape[0] + 1.6, 3.6),
+        )
         axes = figure.subplots()
         sns.heatmap(
-            table.rename(index=style.words, columns=style.words), ax=axes,
+            table.rename(index=style.quantity, columns=style.quantity), ax=axes,
             cmap=sns.light_palette(style.BLUE, as_cmap=True), vmin=0.0, vmax=1.0, annot=True,
             fmt=".2f", annot_kws={"fontsize": 7}, linewidths=0.5,
             cbar_kws={"label": "total index [–]"},
         )  # fmt: skip
+        style.mark_missing(axes, table.isna().to_numpy())
         axes.set(xlabel="", ylabel="")
         axes.tick_params(axis="x", rotation=40, length=0)
         axes.tick_params(axis="y", rotation=0, length=0)
@@ -97,11 +104,11 @@ def draw_second_order(entry: Mapping[str, Any], factors: Sequence[str], title: s
             if i < j:
                 row = entry["second"][f"{a} x {b}"]
                 values[j, i] = row["value"]
-                distinct[j, i] = row["low"] > 0.0 or row["high"] < 0.0
+                distinct[j, i] = row["low"] is not None and (row["low"] > 0.0 or row["high"] < 0.0)
     with style.styled():
-        figure = style.new_figure(0.6 * size + 2.6, 0.42 * size + 1.6)
+        figure = style.new_figure(0.6 * size + 2.6, max(0.42 * size + 1.6, 3.6))
         axes = figure.subplots()
-        labels = [style.words(name) for name in factors]
+        labels = [style.quantity(name) for name in factors]
         limit = max(0.05, float(np.nanmax(np.abs(values))))
         sns.heatmap(
             pd.DataFrame(np.where(distinct, values, 0.0), index=labels, columns=labels), ax=axes,
@@ -131,7 +138,7 @@ def draw_main_effects(effects: Mapping[str, Mapping[str, Any]], ylabel: str) -> 
     effects : ``unit``, ``x``, ``mean``, ``error``, ``low`` and ``high`` by input.
     ylabel : of the output.
     """
-    columns = 4
+    columns = min(4, len(effects))
     rows = -(-len(effects) // columns)
     with style.styled():
         figure = style.new_figure(3.0 * columns, 2.4 * rows)
@@ -150,7 +157,8 @@ def draw_main_effects(effects: Mapping[str, Mapping[str, Any]], ylabel: str) -> 
             axes.set_xlabel(style.label(name, entry["unit"]))
         figure.supylabel(ylabel, fontsize=10)
         handles, labels = grid[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=2, fontsize=9)
+        figure.legend(handles, labels, loc="outside upper center", ncols=min(2, columns),
+                      fontsize=9)  # fmt: skip
         return figure
 
 
@@ -175,7 +183,7 @@ def draw_convergence(convergence: Mapping[str, Sequence[Mapping[str, Any]]]) -> 
                 colour = style.PALETTE[k % len(style.PALETTE)]
                 axes.fill_between(n, low, high, color=colour, alpha=0.15, linewidth=0)
                 axes.plot(n, value, color=colour, marker="o", markersize=3,
-                          label=style.words(factor))  # fmt: skip
+                          label=style.quantity(factor))  # fmt: skip
             axes.set_xscale("log", base=2)
             axes.set_xticks(n, [f"{v:.0f}" for v in n])
             axes.minorticks_off()

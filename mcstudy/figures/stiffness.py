@@ -22,7 +22,8 @@ def draw_force_penetration(loops: Mapping[str, tuple[Array, Array]]) -> Figure:
         figure = style.new_figure(5.2, 3.6)
         axes = figure.subplots()
         for k, (name, (depth, force)) in enumerate(loops.items()):
-            axes.plot(1e3 * depth, force / 1e3, label=name, color=style.PALETTE[k % 8])
+            axes.plot(1e3 * depth, force / 1e3, label=style.safe(name),
+                      color=style.PALETTE[k % 8])  # fmt: skip
         axes.set(**_AXES, xlim=(0.0, None), ylim=(0.0, None))
         if len(loops) > 1:
             axes.legend(framealpha=0.9)
@@ -76,7 +77,7 @@ def draw_fits(loops: Sequence[FittedLoop]) -> Figure:
             )  # fmt: skip
             axes.plot([1e3 * loop.knots[-1], 1e3 * loop.permanent], [loop.fitted[-1] / 1e3, 0.0],
                       color=style.ORANGE, linestyle="--", label="unloading")  # fmt: skip
-            axes.set_title(loop.name)
+            axes.set_title(style.safe(loop.name, 36))
         _label_outer(panels, **_AXES)
         panels[0].set(xlim=(0.0, None), ylim=(0.0, None))
         _legend_above(figure, panels[0])
@@ -92,7 +93,7 @@ def draw_residuals(loops: Sequence[FittedLoop]) -> Figure:
             end = int(np.argmax(loop.depth)) + 1
             gap = loop.force[:end] - np.interp(loop.depth[:end], loop.knots, loop.fitted)
             axes.plot(1e3 * loop.depth[:end], gap, color=style.PALETTE[k % 8], linewidth=1.0,
-                      label=loop.name if len(loops) <= 8 else None)  # fmt: skip
+                      label=style.safe(loop.name) if len(loops) <= 8 else None)  # fmt: skip
         axes.axhline(0.0, color="black", linewidth=0.8)
         axes.set(xlabel="penetration [mm]", ylabel="measured minus fitted force [N]")
         if len(loops) <= 8:
@@ -107,7 +108,7 @@ def draw_pulses(pulses: Mapping[str, tuple[Array, Array, Array]]) -> Figure:
         for axes, (name, (time, measured, simulated)) in zip(panels, pulses.items(), strict=False):
             axes.plot(1e3 * time, measured, color=_MEASURED, linewidth=3.0, label="measured")
             axes.plot(1e3 * time, simulated, color=style.RED, linestyle="--", label="simulated")
-            axes.set_title(name)
+            axes.set_title(style.safe(name, 36))
         _label_outer(panels, xlabel="time after contact [ms]", ylabel="acceleration [g]")
         _legend_above(figure, panels[0])
         return figure
@@ -145,7 +146,7 @@ def draw_corridor(
         left.set(**_AXES, xlim=(0.0, None), ylim=(0.0, None), title="stiffness corridor")
         left.legend(framealpha=0.9, loc="upper left")
         for k, (name, values) in enumerate(hic.items()):
-            right.plot(coordinates, values, label=name, color=style.PALETTE[k % 8])
+            right.plot(coordinates, values, label=style.safe(name), color=style.PALETTE[k % 8])
         for limit, word in ((700.0, "HIC15 700"), (1000.0, "HIC15 1000")):
             right.axhline(limit, color="black", linestyle="--" if limit < 900 else ":",
                           linewidth=1.0, label=word)  # fmt: skip

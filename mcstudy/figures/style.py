@@ -1,16 +1,25 @@
 """The one style of all figures."""
 
+import functools
 import io
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 import seaborn as sns
 from cycler import cycler
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.font_manager import findfont, get_font
+from matplotlib.patches import Rectangle
+from numpy.typing import ArrayLike, NDArray
+
+from mcstudy.statistics import varies
 
 # Okabe and Ito's palette, distinguishable with all common colour vision deficiencies.
 BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
@@ -47,6 +56,11 @@ LABELS = {
     "friction_body_car": "friction body–car",
     "friction_tyre_road": "friction tyre–road",
 }
+LINE, TICK, LINES = 44, 28, 3
+"""Characters of a line of a label and of a tick's, and lines after which one is cut."""
+FARTHEST = 1e4
+"""Times the size of what is drawn that a reference may be away to be drawn with it (assumed)."""
+_NO_WIDTH = "\N{ZERO WIDTH SPACE}"
 _UNIT_TEXT = {"1": "", "m/s2": "m/s²", "rad/s2": "rad/s²"}
 
 
@@ -65,6 +79,86 @@ def words(name: str) -> str:
     if name.startswith("log_") and name not in LABELS:
         return f"log of {words(name.removeprefix('log_'))}"
     return LABELS.get(name, name.replace("_", " "))
+
+
+def safe(text: str, line: int = LINE) -> str:
+    """Return a text that a person wrote as figures can draw it: as label, title or tick.
+
+    It is wrapped and, where it is very long, cut; what no font has is drawn as U+FFFD, and nothing
+    at all as a dash.
+
+    Parameters
+    ----------
+    text : any. line : characters of a line.
+    """
+    drawn = _drawable()
+    plain = "".join(
+        c if c.isprintable() and ord(c) in drawn else "\N{REPLACEMENT CHARACTER}"
+        for c in " ".join(text.split())
+    )
+    lines = textwrap.wrap(plain, line, break_on_hyphens=False) or ["–"]
+    if len(lines) > LINES:
+        lines = [*lines[: LINES - 1], lines[LINES - 1][: line - 1] + "…"]
+    shown = "\n".join(lines)
+    # Matplotlib leaves labels that begin with an underscore out of legends.
+    return _NO_WIDTH + shown if shown.startswith("_") else shown
+
+
+def quantity(name: str) -> str:
+    """Return the name of an input, output or group in words, as figures can draw it at an axis."""
+    return safe(words(name), TICK)
+
+
+@functools.cache
+def _drawable() -> frozenset[int]:
+    """Return the characters that the fonts of the figures have."""
+    found: set[int] = set()
+    with styled():
+        for family in mpl.rcParams["font.sans-serif"]:
+            with suppress(ValueError):
+                found |= set(get_font(findfont(family, fallback_to_default=False)).get_charmap())
+    return frozenset(found)
+
+
+def ends_of(
+    values: ArrayLike, points: Sequence[float] = (), *, below: float = 0.05, above: float = 0.05
+) -> tuple[float, float]:
+    """Return the ends of an axis that holds values, also where they do not vary.
+
+    Parameters
+    ----------
+    values : finite. points : held as well, those that ``is_near`` the values.
+    below, above : room, in shares of the axis.
+    """
+    held: NDArray[np.float64] = np.asarray(values, dtype=float).ravel()
+    held = np.concatenate([held, [point for point in points if is_near(held, point)]])
+    low, high = float(held.min()), float(held.max())
+    if not varies(held):
+        half = 0.05 * max(abs(low), abs(high)) or 1.0
+        low, high = low - half, high + half
+    return low - below * (high - low), high + above * (high - low)
+
+
+def is_near(values: ArrayLike, point: float) -> bool:
+    """Tell whether a point can be drawn on one axis with values without hiding them."""
+    return abs(point) <= FARTHEST * (float(np.abs(np.asarray(values)).max()) or 1.0)
+
+
+def covered(axes: Axes, height: float) -> float:
+    """Return the share of axes, ``height`` inches high, that a small legend of theirs covers."""
+    labels: list[str] = axes.get_legend_handles_labels()[1]
+    lines = sum(1 + label.count("\n") for label in labels)
+    return min(0.17 * lines / height, 0.7)
+
+
+def mark_missing(axes: Axes, missing: NDArray[np.bool_]) -> None:
+    """Hatch the cells of a heat map that have no value, and give them a dash."""
+    for row, column in zip(*np.nonzero(missing), strict=True):
+        axes.add_patch(
+            Rectangle((column, row), 1.0, 1.0, facecolor="#F4F4F4", edgecolor="#C4C4C4",
+                      hatch="///", linewidth=0.0)
+        )  # fmt: skip
+        axes.text(column + 0.5, row + 0.5, "–", ha="center", va="center", fontsize=8)
 
 
 @contextmanager

@@ -16,6 +16,8 @@ Flags = NDArray[np.bool_]
 
 SMALLEST, LARGEST = 1e-100, 1e100
 """Stimuli beyond which a number is taken for a mistake (assumed)."""
+UNEQUAL = 1e9
+"""Ratio of two weights beyond which one of them is taken for a mistake (assumed)."""
 
 
 @dataclass(frozen=True)
@@ -125,6 +127,11 @@ def check(observations: Observations) -> Observations:
             raise ValueError(
                 f"case {k + 1}: the weight must be a positive number, given {weights[k]:g}"
             )
+    if observations.size and weights.max() > UNEQUAL * weights.min():
+        raise ValueError(
+            f"the weights go from {weights.min():g} to {weights.max():g}: a row may not stand for "
+            f"more than {UNEQUAL:g} times the cases of another"
+        )
     if observations.size < 3:
         raise ValueError(f"{observations.size} cases are too few for a risk curve")
     if np.all(low == 0.0):

@@ -41,6 +41,8 @@ NARROWEST = 1e-5
 STEEPEST = 1e4
 """Slope in ln x from which on risk jumps, all within 0.1 % of a stimulus (assumed)."""
 _TOO_STEEP = "risk jumps at one stimulus, and its slope cannot be told: no curve is given"
+LARGEST_LOG_RATIO = 300.0
+"""ln of a density over a share, above which both are so small that nothing of them is known."""
 UNFINISHED = 0.01
 """Standard errors that the search may end short of the greatest likelihood (assumed)."""
 
@@ -96,8 +98,9 @@ class RiskFit:
 
     def quality_index(self, risk: float) -> float:
         """Return the width of the stimulus's interval over the stimulus (ISO/TS 18506)."""
-        value, low, high = self.stimulus_at(risk)
-        return (high - low) / value
+        # The bounds are the stimulus over and times one factor; it may itself be too small to tell.
+        with np.errstate(over="ignore"):
+            return float(2.0 * np.sinh(self.log_stimulus_at(risk)[1]))
 
 
 def quality_class(index: float) -> str:
@@ -225,7 +228,10 @@ def _likelihood(family: str, parameters: Array, cases: _Cases) -> tuple[float, A
         finite = np.isfinite(y)
         held = np.where(finite, y, 0.0)
         log_density, first, _ = _density(family, a + b * held)
-        ratio = np.where(finite, np.exp(log_density - log_share), 0.0)
+        log_ratio = np.where(finite, log_density - log_share, -np.inf)
+        if log_ratio.max(initial=0.0) > LARGEST_LOG_RATIO:
+            return -np.inf, np.zeros_like(gradient), -np.eye(2)
+        ratio = np.exp(log_ratio)
         sides.append((ratio, ratio * first, np.stack([np.ones_like(held), held])))
     (r1, d1, rows1), (r2, d2, rows2) = sides
     gradient[:, ~exact] = w * (rows2 * r2 - rows1 * r1)

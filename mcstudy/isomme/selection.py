@@ -179,13 +179,17 @@ def _combine(test: Test, parts: Sequence[Channel]) -> Channel:
     if len({part.filter for part in parts}) > 1:
         raise UserError(f"{test.path}: the head acceleration's components are filtered differently")
     try:
-        values = np.array([part.values * units.factor(part.unit, "g") for part in parts])
+        scale = np.array([units.factor(part.unit, "g") for part in parts])
     except ValueError as error:
         raise UserError(f"{test.path}: {parts[0].code}: {error}") from None
-    kept = np.isfinite(values).all(axis=0)
     code = parts[0].code[:14] + RESULTANT + parts[0].code[15:]
-    # A resultant channel stays as it is: its noise before contact may be of either sign.
-    found = values[0] if len(parts) == 1 else np.sqrt((values**2).sum(axis=0))
+    values = np.array([part.values for part in parts])
+    kept = np.isfinite(values).all(axis=0)
+    with np.errstate(over="ignore"):
+        # What becomes too large for a number is infinite.
+        values = scale[:, None] * values
+        # A resultant channel stays as it is: its noise before contact may be of either sign.
+        found = values[0] if len(parts) == 1 else np.sqrt((values**2).sum(axis=0))
     notes = [note for part in parts for note in part.notes]
     inside = np.flatnonzero(kept)
     if inside.size:

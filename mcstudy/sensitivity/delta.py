@@ -57,10 +57,13 @@ def delta(values: Array, outputs: Array, rng: np.random.Generator) -> Array:
 def density_shift(values: Array, outputs: Array) -> Array:
     """Return delta of each input without correction for bias (equation 26), shape (d,)."""
     n = outputs.size
+    shift = np.zeros(values.shape[1])
+    if np.ptp(outputs) == 0.0:
+        # A resample may hold one value alone, of which nothing can move.
+        return shift
     grid = np.linspace(outputs.min(), outputs.max(), GRID)
     overall = _density(outputs, grid)
     borders = np.linspace(0.0, n, _classes(n) + 1).astype(int)
-    shift = np.zeros(values.shape[1])
     for column, order in enumerate(np.argsort(values, axis=0, kind="stable").T):
         ordered = outputs[order]
         for low, high in pairwise(borders):

@@ -15,6 +15,7 @@ from mcstudy import seeds
 from mcstudy.sensitivity.delta import delta
 from mcstudy.sensitivity.pawn import pawn
 from mcstudy.sensitivity.rank_based import rank_first_order
+from mcstudy.statistics import varies
 
 Array = NDArray[np.float64]
 
@@ -67,7 +68,7 @@ def measure_given_data(values: Array, outputs: Array, seed: int) -> GivenData:
     rng = seeds.generator(seed, seeds.GIVEN_DATA)
     x = np.column_stack([values[held], rng.random((y.size, DUMMIES))])
     d = values.shape[1]
-    if np.ptp(y) == 0.0:
+    if not varies(y):
         nothing = np.full((3, d), np.nan)
         return GivenData(dict.fromkeys(MEASURES, nothing), dict.fromkeys(MEASURES, np.nan), y.size)
     found = {name: measure(x, y, rng) for name, measure in MEASURES.items()}

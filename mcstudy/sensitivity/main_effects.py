@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcstudy.statistics import scale_of
+
 Array = NDArray[np.float64]
 
 BINS = 16
@@ -24,7 +26,8 @@ def main_effect(values: Array, outputs: Array) -> dict[str, Any]:
         ``high``.
     """
     held = np.isfinite(outputs)
-    x, y = values[held], outputs[held]
+    x, scale = values[held], scale_of(outputs)
+    y = outputs[held] / scale
     parts = np.array_split(np.argsort(x, kind="stable"), min(BINS, max(1, x.size // 8)))
     rows = [
         (np.median(x[p]), y[p].mean(), y[p].std(ddof=1) / np.sqrt(p.size),
@@ -32,5 +35,5 @@ def main_effect(values: Array, outputs: Array) -> dict[str, Any]:
         for p in parts
         if p.size > 1
     ]  # fmt: skip
-    table = np.array(rows).reshape(-1, 5)
+    table = np.array(rows).reshape(-1, 5) * np.array([1.0, scale, scale, scale, scale])
     return dict(zip(("x", "mean", "error", "low", "high"), table.T, strict=True))

@@ -7,7 +7,7 @@ Sort the runs by an input: what the outputs of neighbours share is what that inp
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.statistics import REACH
+from mcstudy.statistics import REACH, scale_of
 
 Array = NDArray[np.float64]
 
@@ -23,6 +23,8 @@ def rank_first_order(values: Array, outputs: Array, rng: np.random.Generator) ->
     ----------
     values : (n, d). outputs : (n,), finite. rng : of the parts.
     """
+    # Squares of scaled outputs neither overflow nor vanish; an index does not feel the scale.
+    outputs = outputs / scale_of(outputs)
     found = _estimate(values, outputs)
     variances = []
     for _ in range(PARTITIONS):

@@ -15,12 +15,14 @@ resampled is whatever is independent: base points, or the replicates that they b
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
+
+from mcstudy.statistics import scale_of, varies
 
 Array = NDArray[np.float64]
 
@@ -118,13 +120,17 @@ def estimate_indices(
 
     Notes
     -----
-    An output that does not vary has indices of NaN. Intervals are those of Student's t with the
+    An output that does not vary beyond rounding has indices of NaN and a variance of zero; no other
+    has, however small its numbers are. One that varies, but not over A and B, has indices and a
+    variance of NaN. Intervals are those of Student's t with the
     bootstrap's standard deviation, which is too small by sqrt((R - 1) / R) for R replicates
     (B. Efron, R. Tibshirani, An Introduction to the Bootstrap, 1993, section 5.3).
     """
     arrays = [blocks.A, blocks.B, blocks.AB] + ([] if blocks.BA is None else [blocks.BA])
     if not all(np.all(np.isfinite(a)) for a in arrays):
         raise ValueError("outputs must be finite: drop failed base points as whole blocks first")
+    blocks, scales, held = _scaled(blocks)
+    arrays = [blocks.A, blocks.B, blocks.AB] + ([] if blocks.BA is None else [blocks.BA])
     n, m = blocks.A.shape
     d = blocks.AB.shape[1]
     if n < 2:
@@ -148,7 +154,33 @@ def estimate_indices(
         found = _with_interval(best[2][0], spread[2], reach)
         for k, (i, j) in enumerate(pairs):
             second[:, i, j] = found[:, k]
-    return Indices(first, total, first_sum, second, best[3][0], n)
+    return Indices(first, total, first_sum, second, _unscaled(best[3][0], scales, held), n)
+
+
+def _scaled(blocks: Blocks) -> tuple[Blocks, Array, NDArray[np.bool_]]:
+    """Return the blocks over the scale of each output, the scales, and which outputs vary.
+
+    Squares of scaled values neither overflow nor vanish, and indices do not feel a scale. An output
+    that does not vary beyond rounding becomes zero.
+    """
+    together = {"A": blocks.A, "B": blocks.B, "AB": blocks.AB}
+    if blocks.BA is not None:
+        together["BA"] = blocks.BA
+    m = blocks.A.shape[1]
+    columns = [np.concatenate([a[..., k].ravel() for a in together.values()]) for k in range(m)]
+    scales = np.array([scale_of(column) for column in columns])
+    held = np.array([varies(column) for column in columns], dtype=bool)
+    parts = {key: np.where(held, a / scales, 0.0) for key, a in together.items()}
+    return replace(blocks, **parts), scales, held
+
+
+def _unscaled(variance: Array, scales: Array, held: NDArray[np.bool_]) -> Array:
+    """Return the variances of outputs, of which some vary, from those of the scaled ones."""
+    with np.errstate(over="ignore", under="ignore"):
+        found = variance * scales * scales
+    # One that is too small for a number is not the zero of an output that does not vary.
+    found = np.maximum(found, np.finfo(float).smallest_subnormal)
+    return np.where(held, np.where(variance > 0.0, found, np.nan), 0.0)
 
 
 def _terms(blocks: Blocks, mean: Array, pairs: Sequence[tuple[int, int]]) -> Array:

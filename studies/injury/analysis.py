@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from mcstudy import seeds
 from mcstudy.config import InjuryStudy
+from mcstudy.errors import StudyError
 from mcstudy.injury.ais import LEVELS, Mechanism, combine, distribution, draw_ais, exceedance, mix
 from mcstudy.injury.association import fit_proportional_odds, rank_correlations
 from mcstudy.injury.classifier import judge_limit, receiver_operating_characteristic
 from mcstudy.injury.functions import RiskFunction
 from mcstudy.schema import AS_IT_STANDS, HEAD, REFERENCE
-from mcstudy.statistics import Estimate, between_replicates
+from mcstudy.statistics import Estimate, between_replicates, varies
 from models.protocol import Model
 from studies.cells import BATCHES, batch_of
 from studies.injury.cells import fronts_of
@@ -69,12 +70,20 @@ def analyse(
     Parameters
     ----------
     study, model, functions : of the cases. cases : of ``outcomes_of``.
+
+    Raises
+    ------
+    StudyError
+        If no run of a scenario with a front is left.
     """
     titles = {REFERENCE: AS_IT_STANDS} | {k: s.title for k, s in study.scenarios.items()}
     shares = {name: front.share for name, front in fronts_of(study).items()}
     total = sum(shares.values())
     shares = {name: share / total for name, share in shares.items()}
     parts = {name: cases[cases["scenario"] == name] for name in titles}
+    for name, part in parts.items():
+        if missing := [front for front in shares if not (part["front"] == front).any()]:
+            raise StudyError(f"scenario {name}, front {missing[0]}: all runs failed")
     analysis: dict[str, Any] = {
         "fronts": shares,
         "limit": study.limit.model_dump() | {"unit": _unit_of(model, study.limit.output)},
@@ -205,10 +214,14 @@ def _associations(study: InjuryStudy, model: Model, part: pd.DataFrame) -> dict[
     known = {item.name for item in model.inputs} | {item.name for item in model.outputs}
     names = [name for name in PREDICTORS if name in known]
     held = part[part[names].notna().all(axis=1)]
-    names = [name for name in names if held[name].nunique() > 1]
+    constant = [name for name in names if not varies(held[name].to_numpy(dtype=float))]
+    names = [name for name in names if name not in constant]
     levels = held["ais"].to_numpy()
-    found: dict[str, Any] = {"runs": len(held), "rank": {}, "odds": None}
-    if len(held) < BATCHES or np.unique(levels).size < 2:
+    found: dict[str, Any] = {
+        "runs": len(held), "rank": {}, "odds": None, "constant": constant,
+        "levels": sorted(set(levels.tolist())),
+    }  # fmt: skip
+    if len(held) < BATCHES or len(found["levels"]) < 2:
         return found
     rng = seeds.generator(study.seed, seeds.BOOTSTRAP)
     for name in names:
@@ -238,11 +251,16 @@ def _judged_by(study: InjuryStudy, functions: Mapping[str, RiskFunction]) -> lis
 def _limit(
     study: InjuryStudy, part: pd.DataFrame, mechanism: str, shares: Mapping[str, float]
 ) -> dict[str, Any]:
-    """Return the limit as a classifier, with intervals between the parts of the design."""
+    """Return the limit as a classifier, with intervals between the parts of the design.
+
+    It is none, and empty, where all runs are alike in their output or injured with certainty or
+    never.
+    """
     limit = study.limit
     stimulus = part[limit.output].to_numpy(dtype=float)
     risk = part[risk_column(mechanism, limit.level)].to_numpy(dtype=float)
-    if not 0.0 < risk.mean() < 1.0:
+    alike = np.isfinite(stimulus).all() and not varies(stimulus)
+    if alike or not 0.0 < risk.mean() < 1.0:
         return {}
     weight = weights_of(part, shares)
     judged = judge_limit(stimulus, risk, limit.value, weight)
@@ -252,7 +270,11 @@ def _limit(
     for b in np.unique(batch):
         own = stimulus[batch == b], risk[batch == b]
         mine = judge_limit(*own, limit.value, weight[batch == b])
-        area = receiver_operating_characteristic(*own, weight[batch == b]).area
+        # Without injured or without uninjured there is no curve.
+        curved = 0.0 < own[1].mean() < 1.0
+        area = (
+            receiver_operating_characteristic(*own, weight[batch == b]).area if curved else np.nan
+        )
         rows.append((mine.sensitivity, mine.specificity, mine.positive, mine.negative, area))
     centre = (judged.sensitivity, judged.specificity, judged.positive, judged.negative, roc.area)
     names = ("sensitivity", "specificity", "positive", "negative", "area")

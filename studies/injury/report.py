@@ -40,13 +40,16 @@ def draw(
         held = reference[stimulus].dropna().to_numpy(dtype=float)
         if held.size < 2:
             continue
-        x = np.linspace(0.0, float(np.quantile(held, 0.995)) * 1.15, 300)[1:]
+        limit = study.limit.value if stimulus == study.limit.output else None
+        end = max(1.15 * float(np.quantile(held, 0.995)), 0.0)
+        if limit is not None and style.is_near(held, limit):
+            end = max(end, 1.15 * limit)
+        x = np.linspace(0.0, end or 1.0, 300)[1:]
         mine = {key: f for key, f in functions.items() if f.stimulus == stimulus}
         curves = {
             f.title: {level: f.risk(level, x, age) for level in f.levels} for f in mine.values()
         }
         unit = next(iter(mine.values())).unit
-        limit = study.limit.value if stimulus == study.limit.output else None
         figures[f"risk_{stimulus}"] = risk.draw_levels(
             curves, x, held, style.label(stimulus, unit), limit
         )
@@ -163,7 +166,8 @@ def summarise(analysis: Mapping[str, Any]) -> list[str]:
 def _changed(change: Mapping[str, float | None]) -> str:
     """Say how many fewer or more."""
     value, low, high, relative = (change[k] for k in ("value", "low", "high", "relative"))
-    assert value is not None
+    if not value:
+        return "no difference that can be told from none"
     verb = "fewer" if value < 0.0 else "more"
     percentage = "" if relative is None else f" ({100.0 * relative:+.0f} %)"
     if low is None or high is None:
@@ -184,6 +188,11 @@ def _count(estimate: Mapping[str, float | None]) -> str:
         shown.append(f"{count:,.0f}" if abs(count) >= 10.0 else f"{count:.1f}")
     value, low, high = (text.replace("-0.0", "0.0").replace("nan", "–") for text in shown)
     return value if "–" in (low, high) else f"{value} ({low} to {high})"
+
+
+def _whole(probability: float | None) -> str:
+    """Return a probability in whole per cent, a dash where it is unknown."""
+    return "–" if probability is None else f"{100.0 * probability:.0f}"
 
 
 def _spread(estimate: Mapping[str, float | None]) -> str:
@@ -241,15 +250,14 @@ def _observed_said(analysis: Mapping[str, Any]) -> list[str]:
     for entry in observed["injuries"]:
         low, high = entry["central_90"]
         by = ", ".join(
-            f"{100.0 * value:.0f} % by {analysis['functions'][name]['title']}"
+            f"{_whole(value)} % by {analysis['functions'][name]['title']}"
             for name, value in entry["by_function"].items()
         )
         label = capital(entry["label"])
         lines.append(
             f"{label} (AIS {entry['level']}): its probability was "
             f"{percent(entry['probability'])}; over nine runs in ten it lies between "
-            f"{100.0 * low:.0f} and {100.0 * high:.0f} %."
-            + (f" By risk function: {by}." if by else "")
+            f"{_whole(low)} and {_whole(high)} %." + (f" By risk function: {by}." if by else "")
         )
     if "all" in observed:
         both = observed["all"]
@@ -265,7 +273,7 @@ def _halved_tables(analysis: Mapping[str, Any]) -> list[Table]:
     if not speed:
         return []
     rows = [
-        [name, f"{100.0 * entry['now']:.0f} %", interval(entry)]
+        [name, f"{_whole(entry['now'])} %", interval(entry)]
         for name, entry in speed["halved"].items()
     ]
     caption = (
@@ -311,6 +319,11 @@ def _limit_said(analysis: Mapping[str, Any]) -> list[str]:
                 f"{percent(judged['sensitivity'])} of the injured; by these risk functions the "
                 f"best one (Youden) would be {number(judged['best'])}"
             )
+        else:
+            said += (
+                f"; as a test of AIS {limit['level']}+ of the head the limit says nothing, as the "
+                "runs cannot be told apart"
+            )
         lines.append(said + ".")
     return lines
 
@@ -336,6 +349,10 @@ def _association_table(entry: Mapping[str, Any]) -> Table:
         for name, pair in found["rank"].items()
     ]  # fmt: skip
     caption = f"{entry['title']}: {found['runs']:,} runs."
+    if len(found["levels"]) == 1:
+        caption += f" All outcomes are AIS {found['levels'][0]}, so nothing goes with them."
+    elif found["constant"]:
+        caption += f" What does not vary: {', '.join(map(style.words, found['constant']))}."
     if found["odds"]:
         caption += f" The regression explains {100.0 * found['explained']:.0f} % (McFadden)."
     return Table(caption, ["", "Spearman's rho", "Kendall's tau", "odds ratio per sd"], rows)

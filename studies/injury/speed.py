@@ -87,10 +87,11 @@ def describe_speed(
         speeds_half = np.array([_speed_at(middle, c, 0.5 * now) for c in resampled])
         half = _speed_at(middle, curve, 0.5 * now)
         held_half = speeds_half[np.isfinite(speeds_half)]
-        known = np.isfinite(half) and held_half.size > 0.9 * RESAMPLES
+        # Of no risk there is no half.
+        known = now > 0.0 and np.isfinite(half) and held_half.size > 0.9 * RESAMPLES
         found["halved"][name] = {
             "now": now,
-            "value": half,
+            "value": half if now > 0.0 else np.nan,
             "low": float(np.quantile(held_half, 0.025)) if known else np.nan,
             "high": float(np.quantile(held_half, 0.975)) if known else np.nan,
         }

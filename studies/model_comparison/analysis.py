@@ -10,12 +10,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mcstudy import config, units
-from mcstudy.agreement import breaking_inputs, compare, split_variance
+from mcstudy.agreement import breaking_inputs, compare, split_variance, without_rounding
 from mcstudy.config import ModelComparison
 from mcstudy.errors import StudyError, UserError
 from mcstudy.results import check_failures, status_counts
 from mcstudy.sensitivity.given_data import FEWEST_RUNS, measure_given_data
-from mcstudy.statistics import Estimate
+from mcstudy.statistics import Estimate, scale_of, varies
 from models.protocol import Model, complete_status
 from studies.cells import batch_of
 from studies.execution import describe_ends
@@ -90,8 +90,13 @@ def analyse(
         if held.sum() >= FEWEST_PAIRS:
             table = values.to_numpy(dtype=float)
             entry["variance"] = asdict(split_variance(table[held], parts[held]))
-            entry["method_sd"] = float(np.sqrt(table[held].var(axis=1, ddof=1).mean()))
-            entry["spread"] = {label: float(values[label].std()) for label in models}
+            # Squares of scaled values neither overflow nor vanish.
+            scale = scale_of(table)
+            scatter = (table[held] / scale).var(axis=1, ddof=1).mean()
+            entry["method_sd"] = scale * float(np.sqrt(scatter))
+            entry["spread"] = {
+                label: scale * float((values[label] / scale).std()) for label in models
+            }
             entry["pairs"] = {
                 f"{one}/{two}": _pair(study, table[:, [i, j]], inputs, parts)
                 | {"unit": unit_of[name]}
@@ -127,8 +132,11 @@ def published_methods(study: ModelComparison, model: Model) -> dict[str, Any]:
                 values = np.array(rows) * units.factor(given, si[name])
             except ValueError as error:
                 raise UserError(f"tables[{k}].units.{name}: {error}") from None
-            found[name] = {"unit": si[name], "methods": len(rows), "mean": float(values.mean()),
-                           "sd": float(values.std(ddof=1))}  # fmt: skip
+            scale = scale_of(values)
+            scaled = values / scale
+            found[name] = {"unit": si[name], "methods": len(rows),
+                           "mean": scale * float(scaled.mean()),
+                           "sd": scale * float(scaled.std(ddof=1))}  # fmt: skip
     return found
 
 
@@ -137,7 +145,8 @@ def _pair(
 ) -> dict[str, Any]:
     """Return how two models agree, over which inputs they do not, and where most."""
     held = np.isfinite(values).all(axis=1)
-    one, two = values[held].T
+    one = values[held, 0]
+    two = without_rounding(one, values[held, 1])
     table = inputs[held].to_numpy(dtype=float)
     found: dict[str, Any] = asdict(compare(one, two, parts[held]))
     gains, noise = breaking_inputs(one, two, table, study.seed)
@@ -156,6 +165,8 @@ def _pair(
             },
             "noise": given.noise["first_order"],
         }
+    if not varies(difference):
+        return found | {"most_apart": []}
     worst = np.argsort(-np.abs(difference - difference.mean()), kind="stable")[:MOST_APART]
     runs = np.flatnonzero(held)[worst]
     found["most_apart"] = [

@@ -50,7 +50,7 @@ def draw(
         along = {}
         for name in names:
             gains = found[name]["breaking"]["gains"]
-            key = max(gains, key=lambda k: gains[k])
+            key = max(gains, key=lambda k: gains[k] or 0.0)
             spec = study.inputs[key]
             shown = runs[one][key].to_numpy(dtype=float) * units.factor(si[key], spec.unit)
             along[name] = (shown, style.label(key, spec.unit))
@@ -161,16 +161,22 @@ def _percent(entry: Mapping[str, Any]) -> str:
         "–" if entry[key] is None else f"{100.0 * entry[key]:.0f}".replace("-0", "0")
         for key in ("value", "low", "high")
     ]
+    if shown[0] == "–":
+        return "–"
     return f"{shown[0]} %" if "–" in shown else f"{shown[0]} % ({shown[1]} to {shown[2]})"
 
 
-def _gain(value: float) -> str:
-    """Return a gain with two decimals, nothing where it rounds to nothing."""
+def _gain(value: float | None) -> str:
+    """Return a gain with two decimals, zero without a sign."""
+    if value is None:
+        return "–"
     return f"{value:.2f}".replace("-0.00", "0.00")
 
 
 def _variance_said(name: str, entry: Mapping[str, Any]) -> str:
     split = entry["variance"]
+    if split["inputs"]["value"] is None:
+        return f"{_title(name)} does not vary, by whatever model."
     return (
         f"{_title(name)}: of its variance {_percent(split['inputs'])} is the inputs alike in all "
         f"models, {_percent(split['method'])} the method's own shift, and "
@@ -195,6 +201,8 @@ def _variance_table(analysis: Mapping[str, Any]) -> Table:
 
 def _pair_said(name: str, found: Mapping[str, Any], one: str, two: str) -> str:
     u = unit(found["unit"])
+    if found["spread"]["value"] == found["bias"]["value"] == 0.0:
+        return f"{_title(name)}: {one} and {two} give the same value in every run."
     bias, low, high = found["bias"], found["lower"]["value"], found["upper"]["value"]
     differs = bias["low"] is None or bias["low"] > 0.0 or bias["high"] < 0.0
     side = "above" if bias["value"] > 0.0 else "below"
@@ -206,7 +214,11 @@ def _pair_said(name: str, found: Mapping[str, Any], one: str, two: str) -> str:
     return (
         f"{_title(name)}: {shift}; 95 % of the differences lie between {number(low)} and "
         f"{quantity(high, found['unit'])}. "
-        f"Rank correlation {interval(found['rank_correlation'], 2)}."
+        + (
+            f"Rank correlation {interval(found['rank_correlation'], 2)}."
+            if found["rank_correlation"]["value"] is not None
+            else "There is no rank correlation where one of them does not vary."
+        )
     )
 
 
@@ -236,6 +248,10 @@ def _pair_table(analysis: Mapping[str, Any], pair: str) -> Table:
 def _breaking_said(name: str, found: Mapping[str, Any]) -> str:
     gains, noise = found["breaking"]["gains"], found["breaking"]["noise"]
     rank = found["rank_correlation"]["value"]
+    if rank is None:
+        return f"{_title(name)}: there is no rank correlation that an input could break."
+    if found["spread"]["value"] == 0.0:
+        return f"{_title(name)}: no input breaks the rank correlation of {rank:.2f}."
     order = [key for key in sorted(gains, key=lambda k: -gains[k]) if gains[key] > noise]
     if not order:
         return (
@@ -285,7 +301,7 @@ def _apart_table(
     shown = []
     for name in names:
         gains = analysis["outputs"][name]["pairs"][pair]["breaking"]["gains"]
-        shown += sorted(gains, key=lambda k: -gains[k])[:NAMED]
+        shown += sorted(gains, key=lambda k: -(gains[k] or 0.0))[:NAMED]
     columns = list(dict.fromkeys(shown))
     si = {item.name: item.unit for item in models[pair.split("/")[0]].inputs}
     rows = []
@@ -316,9 +332,11 @@ def _published(
         mine = analysis["outputs"].get(name, {}).get("method_sd")
         said = (
             f"{_title(name)}: the {entry['methods']} published methods scatter by "
-            f"{quantity(entry['sd'], entry['unit'])} ({100.0 * entry['sd'] / entry['mean']:.0f} % "
-            "of their mean) for one set of inputs"
+            f"{quantity(entry['sd'], entry['unit'])}"
         )
+        if entry["mean"]:
+            said += f" ({number(100.0 * entry['sd'] / abs(entry['mean']), 2)} % of their mean)"
+        said += " for one set of inputs"
         if mine is not None:
             said += f"; ours, over all sets of inputs, by {quantity(mine, entry['unit'])}"
         lines.append(f"{said}.")

@@ -30,7 +30,7 @@ def sections_of(
         "throw_and_wad": "Throw and wrap-around distance of every run, and the accident's own.",
         "impact_speed": "Outputs against impact speed: median and 90 % band of the runs around it.",
         "rank_correlation": "Spearman rank correlation of inputs and outputs; grey: not "
-        "distinguishable from zero.",
+        "distinguishable from zero; hatched: none, as an input or output does not vary.",
         "convergence": "Median over growing parts of the study.",
         "failures": "Share of failed runs in each tenth of each input.",
     }
@@ -55,14 +55,15 @@ def sections_of(
 def summarise(analysis: Mapping[str, Any]) -> list[Table]:
     """Return the distributions of the reported outputs as a short table."""
     rows = []
-    for name in analysis["convergence"]:
+    for name in analysis["rank_correlation"]:
         entry = analysis["outputs"][name]
-        if "mean" in entry:
-            q = entry["quantiles"]
-            rows.append(
-                [name, entry["unit"], interval(entry["mean"]),
-                 *(number(q[p]["value"]) for p in ("0.05", "0.5", "0.95"))]
-            )  # fmt: skip
+        known = (
+            [interval(entry["mean"]),
+             *(number(entry["quantiles"][p]["value"]) for p in ("0.05", "0.5", "0.95"))]
+            if "mean" in entry
+            else ["–"] * 4
+        )  # fmt: skip
+        rows.append([name, entry["unit"], *known])
     head = ["output", "unit", "mean (95 % interval)", "5 %", "median", "95 %"]
     return [Table("", head, rows)]
 
@@ -73,15 +74,9 @@ def _title(name: str) -> str:
 
 def _summary(study: MonteCarloStudy, model: Model, analysis: Mapping[str, Any]) -> list[str]:
     unit_of = {item.name: item.unit for item in model.outputs}
-    lines = []
-    for name in analysis["convergence"]:
-        q = analysis["outputs"][name]["quantiles"]
-        u = unit(unit_of[name])
-        lines.append(
-            f"{_title(name)}: median {' '.join((interval(q['0.5']), u)).strip()}; nine runs in ten "
-            f"lie between {number(q['0.05']['value'])} and "
-            f"{' '.join((number(q['0.95']['value']), u)).strip()}."
-        )
+    lines = [
+        _distribution(name, analysis["outputs"][name]) for name in analysis["rank_correlation"]
+    ]
     for name, entries in analysis["exceedance"].items():
         lines += [
             f"{_title(name)} exceeds {quantity(e['value'], unit_of[name])} ({e['label']}) in "
@@ -89,6 +84,23 @@ def _summary(study: MonteCarloStudy, model: Model, analysis: Mapping[str, Any]) 
             for e in entries
         ]
     return lines
+
+
+def _distribution(name: str, entry: Mapping[str, Any]) -> str:
+    """Say in words how an output is distributed."""
+    title, count = _title(name), entry["n"]
+    if "quantiles" not in entry:
+        return f"{title}: {'only one run' if count else 'no run'} has a value."
+    q, u = entry["quantiles"], unit(entry["unit"])
+    if entry["sd"]["value"] == 0.0:
+        held = " that have a value" if entry["undefined"] else ""
+        value = f"{number(q['0.5']['value'], 4)} {u}".strip()
+        return f"{title} does not vary: it is {value} in all {count:,} runs{held}."
+    return (
+        f"{title}: median {' '.join((interval(q['0.5']), u)).strip()}; nine runs in ten "
+        f"lie between {number(q['0.05']['value'])} and "
+        f"{' '.join((number(q['0.95']['value']), u)).strip()}."
+    )
 
 
 def _accident(analysis: Mapping[str, Any], model: Model) -> list[str]:

@@ -152,7 +152,10 @@ def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[st
                 analysis["observed"].setdefault(name, []).append(entry)
             else:
                 analysis["exceedance"].setdefault(name, []).append(entry)
-    ranks = complete[[*sampled, *wanted]].corr("spearman")
+    columns = complete[[*sampled, *wanted]].astype(float)
+    # Ranks of a column that differs by rounding alone say nothing.
+    varying = columns.apply(lambda column: statistics.varies(column.to_numpy()))
+    ranks = columns.where(varying, axis="columns").corr("spearman")
     table = ranks.loc[sampled, wanted]
     analysis["rank_correlation"] = {
         name: {k: float(v) for k, v in table[name].items()} for name in wanted
@@ -181,9 +184,12 @@ def draw(
         "rank_correlation": relations.draw_correlations(
             pd.DataFrame(analysis["rank_correlation"]), analysis["rank_correlation_noise"]
         ),
-        "convergence": relations.draw_convergence(analysis["convergence"], wanted),
     }
-    if "impact_speed" in study.inputs:
+    steps = {name: table for name, table in analysis["convergence"].items() if table}
+    if steps:
+        figures["convergence"] = relations.draw_convergence(steps, wanted)
+    speed = complete["impact_speed"].to_numpy() if "impact_speed" in study.inputs else np.zeros(0)
+    if statistics.varies(speed):
         shown = complete.assign(impact_speed=3.6 * complete["impact_speed"])
         figures["impact_speed"] = relations.draw_against_input(
             shown, "impact_speed", "impact speed [km/h]", wanted, marks

@@ -22,7 +22,10 @@ acting through curvature or interactions (assumed)."""
 
 def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
     """Return the study's figures by file name."""
-    ranked = {name: analysis["outputs"][name] for name in analysis["ranked"]}
+    outputs = analysis["outputs"]
+    ranked = {name: outputs[name] for name in analysis["ranked"] if _varies(outputs[name])}
+    if not ranked:
+        return failure_map(analysis)
     return failure_map(analysis) | {
         "mean_effects": screening.draw_mean_effects(ranked, DUMMY),
         "elementary_effects": screening.draw_elementary_effects(ranked),
@@ -33,21 +36,24 @@ def sections_of(
     study: MorrisStudy, model: Model, analysis: Mapping[str, Any], figures: Mapping[str, Any]
 ) -> list[Section]:
     """Return the sections of the report."""
+    outputs = analysis["outputs"]
+
+    def one(name: str, caption: str) -> dict[str, Any]:
+        return {caption: figures[name]} if name in figures else {}
+
     reach = f"from the {100 * TAIL:g} % to the {100 - 100 * TAIL:g} % point of a factor"
     return [
         Section(
             "Which factors matter",
             [*summarise(analysis), *_not_ranked(analysis)],
-            [_table(name, analysis["outputs"][name]) for name in analysis["ranked"]],
-            {
+            [_table(name, outputs[name]) for name in analysis["ranked"] if _varies(outputs[name])],
+            one("mean_effects",
                 f"Mean size of the elementary effects (μ*), {reach}, with 95 % intervals. Factors "
-                "that do not pass the noise line are not distinguishable from none.":
-                figures["mean_effects"],
-                "Scatter of the elementary effects (σ) over their mean size: at the bottom "
-                "factors that act alike everywhere, towards the upper left those whose effect "
-                "depends on the other factors or on where they stand. Groups have no σ.":
-                figures["elementary_effects"],
-            },
+                "that do not pass the noise line are not distinguishable from none.")
+            | one("elementary_effects",
+                  "Scatter of the elementary effects (σ) over their mean size: at the bottom "
+                  "factors that act alike everywhere, towards the upper left those whose effect "
+                  "depends on the other factors or on where they stand. Groups have no σ."),
         ),
         Section(
             "How sure the numbers are",
@@ -61,9 +67,7 @@ def sections_of(
                 *failures_said(analysis),
             ],
             [status_table(analysis)],
-            {"Share of failed runs in each tenth of each input.": figures["failures"]}
-            if "failures" in figures
-            else {},
+            one("failures", "Share of failed runs in each tenth of each input."),
         ),
         Section("The model", (f"Model {model.name}, version {model.version}.",
                               groups_said(analysis))),
@@ -83,6 +87,8 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     clear = [f for f in order if factors[f]["clear"]]
     suffix = f" {unit(entry['unit'])}".rstrip()
     title = style.words(name)
+    if not _varies(entry):
+        return f"{capital(title)} does not vary."
     if not clear:
         return f"{capital(title)}: no factor stands out of the noise."
     named = ", ".join(
@@ -104,6 +110,11 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
         lines.append(f"Not distinguishable from noise: {', '.join(style.words(f) for f in weak)}.")
     lines.append(f"Noise floor: {number(noise['value'], 2)}{suffix}.")
     return " ".join(lines)
+
+
+def _varies(entry: Mapping[str, Any]) -> bool:
+    """Tell whether any factor, or the dummy, moves an output at all."""
+    return any(row["value"] != 0.0 for row in entry["factors"].values())
 
 
 def _not_ranked(analysis: Mapping[str, Any]) -> list[str]:

@@ -20,14 +20,14 @@ NAMED = 4
 def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
     """Return the study's figures by file name."""
     outputs = analysis["outputs"]
-    varying = [name for name in analysis["convergence"] if outputs[name]["variance"]]
+    varying = [name for name in analysis["convergence"] if varies(outputs[name])]
     figures: dict[str, Any] = failure_map(analysis)
     if not varying:
         return figures
     figures |= {
         "indices": sensitivity.draw_indices({name: outputs[name] for name in varying}, DUMMY),
         "heatmap": sensitivity.draw_heatmap(
-            {name: entry for name, entry in outputs.items() if entry.get("variance")}
+            {name: entry for name, entry in outputs.items() if "total" in entry}
         ),
         "convergence": sensitivity.draw_convergence(
             {name: analysis["convergence"][name] for name in varying}
@@ -66,25 +66,29 @@ def sections_of(
         Section(
             "What drives the outputs",
             summarise(analysis),
-            [_index_table(name, outputs[name]) for name in wanted],
+            [_index_table(name, outputs[name]) for name in wanted if varies(outputs[name])],
             one("indices", "First-order and total indices with 95 % intervals. Factors whose total "
                 "index does not pass the noise line are not distinguishable from none."),
         ),
         Section(
             "All outputs",
             ["Total indices: the share of an output's variance that would be left if all but this "
-             "factor were known.", *_not_given(analysis)],
+             "factor were known.", *_constant(analysis), *_not_given(analysis)],
             (),
-            one("heatmap", "Total index of every output by factor."),
-        ),
-        Section(
-            "Main effects",
-            ("What an output does on average as one input goes through its distribution, and the "
-             "spread that the others leave.",),
-            (),
-            picked("main_effects", "Conditional mean and band of"),
+            one("heatmap", "Total index of every output by factor. Hatched: none, as the output "
+                "does not vary, or hardly ever."),
         ),
     ]  # fmt: skip
+    if any(varies(outputs[name]) for name in wanted):
+        sections.append(
+            Section(
+                "Main effects",
+                ("What an output does on average as one input goes through its distribution, and "
+                 "the spread that the others leave.",),
+                (),
+                picked("main_effects", "Conditional mean and band of"),
+            )
+        )  # fmt: skip
     second = picked("second_order", "Second-order indices of")
     if second:
         sections.append(
@@ -120,9 +124,14 @@ def summarise(analysis: Mapping[str, Any]) -> list[str]:
 def sentence(name: str, entry: Mapping[str, Any]) -> str:
     """Say in words what drives an output."""
     title = style.words(name)
-    if not entry["variance"]:
+    if not varies(entry):
         return f"{capital(title)} does not vary."
     first, total = entry["first"], entry["total"]
+    if any(row["low"] is None for table in (first, total) for row in table.values()):
+        return (
+            f"{capital(title)} hardly ever changes: in some resamples of the design it does not "
+            "vary, so its indices have no intervals and nothing is said of what drives it."
+        )
     noise = total[DUMMY]
     factors = [factor for factor in total if factor != DUMMY]
     order = sorted(factors, key=lambda factor: -first[factor]["value"])
@@ -188,18 +197,37 @@ def _percent(entry: Mapping[str, float], unit: str = " %") -> str:
     return f"{max(0, round(100.0 * entry['value']))}{unit}"
 
 
-def _quantity(value: float, entry: Mapping[str, Any]) -> str:
+def _quantity(value: float | None, entry: Mapping[str, Any]) -> str:
     return quantity(value, entry["unit"], 2)
+
+
+def varies(entry: Mapping[str, Any]) -> bool:
+    """Tell whether an output with indices varies; a variance beyond all numbers is none in JSON."""
+    return bool(entry["variance"] != 0.0)
+
+
+def _sd(entry: Mapping[str, Any]) -> float | None:
+    """Return the standard deviation of an output."""
+    return None if entry["variance"] is None else float(entry["variance"] ** 0.5)
 
 
 def _index_table(name: str, entry: Mapping[str, Any]) -> Table:
     order = sorted(entry["total"], key=lambda f: -(entry["total"][f]["value"] or 0.0))
     rows = [[style.words(f), share(entry["first"][f]), share(entry["total"][f])] for f in order]
     caption = (
-        f"{style.words(name)}: standard deviation {_quantity(entry['variance'] ** 0.5, entry)}, "
+        f"{style.words(name)}: standard deviation {_quantity(_sd(entry), entry)}, "
         f"{entry['base_points']:,} base points. Negative estimates are noise about zero."
     )
     return Table(caption, ["factor", "first order (95 %)", "total (95 %)"], rows)
+
+
+def _constant(analysis: Mapping[str, Any]) -> list[str]:
+    held = [n for n, entry in analysis["outputs"].items() if "total" in entry and not varies(entry)]
+    if not held:
+        return []
+    return [
+        f"No index is given where an output does not vary: {', '.join(map(style.words, held))}."
+    ]
 
 
 def _not_given(analysis: Mapping[str, Any]) -> list[str]:
@@ -219,14 +247,14 @@ def _not_given(analysis: Mapping[str, Any]) -> list[str]:
 def _noise_table(analysis: Mapping[str, Any]) -> Table:
     rows = []
     for name, entry in analysis["outputs"].items():
-        if entry.get("variance"):
-            dummy = entry["total"][DUMMY]
+        if "total" in entry and varies(entry):
+            noise = entry["total"][DUMMY]["value"]
             rows.append(
                 [
                     style.words(name),
-                    _quantity(entry["variance"] ** 0.5, entry),
+                    _quantity(_sd(entry), entry),
                     _quantity(entry["noise_sd"], entry),
-                    f"{100.0 * dummy['value']:.2g} %",
+                    "–" if noise is None else f"{100.0 * noise:.2g} %",
                 ]
             )
     head = ["output", "standard deviation", "of it the noise floor", "share of the variance"]
@@ -236,6 +264,8 @@ def _noise_table(analysis: Mapping[str, Any]) -> Table:
 def _convergence_said(analysis: Mapping[str, Any]) -> str:
     if analysis["widest"] is None:
         return "Some intervals could not be estimated: an output hardly ever changes."
+    if not any(varies(analysis["outputs"][name]) for name in analysis["convergence"]):
+        return "No reported output varies, so there is no index whose interval could be wide."
     said = (
         f"The widest 95 % interval of a total index of the reported outputs is "
         f"{analysis['widest']:.3f} wide, with a design of {analysis['base_points']:,} base points."

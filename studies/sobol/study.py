@@ -1,5 +1,6 @@
 """The Sobol' study: how much of the variance of each output each factor explains."""
 
+import math
 from typing import Any
 
 from mcstudy import config
@@ -69,7 +70,8 @@ def run_sobol(
             if design.tolerance is None or n >= design.n:
                 break
             width = widest_interval(study, model, runs)
-            say(f"{n} base points: widest interval of a total index {width:.3f}", quiet=quiet)
+            known = "cannot be estimated yet" if math.isinf(width) else f"{width:.3f}"
+            say(f"{n} base points: widest interval of a total index {known}", quiet=quiet)
             if width <= design.tolerance:
                 break
             n *= 2

@@ -1,0 +1,366 @@
+"""Outputs and inputs that do not vary, and numbers of any size: in words, drawn, no warning."""
+
+import contextlib
+import html
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import numpy as np
+import pytest
+from headform_studies import (
+    INPUTS,
+    closed_form,
+    copy_of,
+    mcstudy,
+    run_text,
+    study_text,
+)
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from numpy.typing import NDArray
+
+from mcstudy.errors import StudyError
+from mcstudy.figures import style
+from mcstudy.report import document
+from mcstudy.results import ResultsFolder
+from models.registry import load_model
+from studies import api, evaluation
+from studies.injury import speed as injury_speed
+from studies.injury import study as injury
+from studies.sobol import analysis as sobol_analysis
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+Figures = dict[str, Figure]
+
+DESIGNS = {
+    "monte-carlo": "n = 120\nreplicate_size = 20",
+    "sobol": "n = 64",
+    "morris": "n = 8",
+}
+FLAT_SPEED = """
+[inputs.impact_speed]
+distribution = "uniform"
+unit = "km/h"
+low = 30.0
+high = 30.00000000000001
+"""
+ONE_SPEED = """
+[inputs.impact_speed]
+distribution = "uniform"
+unit = "km/h"
+low = 29.0
+high = 31.0
+"""
+HOODS = """\
+format = "mcstudy-study/1"
+kind = "model-comparison"
+name = "two_hoods"
+title = "Two hoods"
+
+[models.soft]
+name = "headform"
+options = { hood_curve = [[0.0, 0.0], [0.1, 10000.0]] }
+
+[models.stiff]
+name = "headform"
+options = { hood_curve = [[0.0, 0.0], [0.1, 20000.0]] }
+
+[design]
+n = 40
+replicate_size = 10
+"""
+INJURY = """\
+format = "mcstudy-study/1"
+kind = "injury"
+name = "headform_injury"
+title = "Injuries"
+age = 7.5
+max_failure_rate = 1.0
+
+[model]
+name = "headform"
+options = { hood_curve = [[0.0, 0.0], [0.1, 10000.0]] }
+
+[design]
+n = 120
+replicate_size = 20
+
+[mechanisms.impact]
+functions = { nhtsa_lognormal = 1.0, prasad_mertz = 3.0 }
+
+[scenarios.slower]
+title = "_slower [red] $x$ %"
+[scenarios.slower.inputs.impact_speed]
+distribution = "lognormal"
+unit = "km/h"
+median = 24.0
+sigma = 0.12
+"""
+
+
+def rounded(
+    argument: Mapping[str, Any], rows: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], list[str]]:
+    """Return what the formula gives, with a HIC15 that rounding alone tells from 700.1."""
+    outputs, _ = closed_form(argument, rows)
+    names = [item.name for item in load_model(argument["name"], argument["options"]).outputs]
+    outputs[:, names.index("hic15")] = 700.1 * (1.0 + 1e-15 * np.round(rows[:, 0] % 1.0 * 5.0))
+    return outputs, ["ok"] * len(rows)
+
+
+@pytest.fixture(autouse=True)
+def drawn() -> Iterator[Figures]:
+    """Run by formula, constant in HIC15; draw every figure once, and keep them."""
+    held: Figures = {}
+
+    def save(figures: Figures, _: Path) -> None:
+        held.clear()
+        held.update(figures)
+        for figure in figures.values():
+            figure.draw_without_rendering()
+
+    with (
+        mock.patch.object(evaluation, "evaluate", rounded),
+        mock.patch.object(style, "save", save),
+        mock.patch.object(document, "png_bytes", lambda *_: b""),
+        mock.patch.object(sobol_analysis, "STEP_RESAMPLES", 8),
+        mock.patch.object(injury_speed, "RESAMPLES", 20),
+    ):
+        yield held
+
+
+def words_of(folder: ResultsFolder) -> str:
+    """Return the words of a report, checked to hold no word of the program's for nothing."""
+    text = (folder.path / "report.html").read_text(encoding="utf-8")
+    text = html.unescape(re.sub(r"<[^>]+>", " ", re.sub(r"(?s)<style>.*?</style>", "", text)))
+    assert not re.search(r"\b(nan|inf|None|null)\b", text.replace("None of them", ""))
+    return " ".join(text.split())
+
+
+def ran(text: str, path: Path) -> ResultsFolder:
+    folder = ResultsFolder(path)
+    run_text(text, folder)
+    return folder
+
+
+def legend_of(figure: Figure) -> list[str]:
+    """Return the words of all legends of a figure, on one line each."""
+    legends = figure.findobj(Legend)
+    texts = [text.get_text() for legend in legends for text in legend.get_texts()]
+    return [text.removeprefix("\N{ZERO WIDTH SPACE}").replace("\n", " ") for text in texts]
+
+
+def cells_of(figure: Figure) -> list[str]:
+    return [text.get_text() for text in figure.axes[0].texts]
+
+
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ResultsFolder]:
+    """Return a finished folder of each kind, of an output that varies."""
+    base = tmp_path_factory.mktemp("sources")
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(mock.patch.object(evaluation, "evaluate", closed_form))
+        stack.enter_context(mock.patch.object(style, "save", lambda *_: None))
+        stack.enter_context(mock.patch.object(document, "png_bytes", lambda *_: b""))
+        return {
+            kind: ran(study_text(kind, DESIGNS[kind], inputs=ONE_SPEED, outputs=("hic15",)),
+                      base / kind)
+            for kind in DESIGNS
+        }  # fmt: skip
+
+
+# -- each kind of study -----------------------------------------------------------------------
+
+
+def test_monte_carlo_says_and_draws_what_is_constant(tmp_path: Path, drawn: Figures) -> None:
+    inputs = FLAT_SPEED + INPUTS[INPUTS.index("[inputs.headform_mass]") :]
+    references = (
+        'references = [{ output = "hic15", value = 650.0, label = "_limit of 2020" },'
+        ' { output = "hic15", value = 1e250, label = "far" }]\n'
+    )
+    text = study_text("monte-carlo", DESIGNS["monte-carlo"], inputs=inputs)
+    folder = ran(text + references, tmp_path / "out")
+    assert "HIC15 does not vary: it is 700.1 in all 120 runs." in words_of(folder)
+    entry = folder.read_json("analysis.json")["outputs"]["hic15"]
+    assert entry["sd"]["value"] == 0.0
+    assert entry["mean"]["value"] == pytest.approx(700.1)
+    correlations = folder.read_json("analysis.json")["rank_correlation"]
+    assert set(correlations["hic15"].values()) == {None}
+    assert correlations["peak_force"]["impact_speed"] is None
+    assert correlations["peak_force"]["hood_force_scale"] > 0.5
+    assert cells_of(drawn["rank_correlation"]).count("–") == 4
+    assert "impact_speed" not in drawn
+    assert legend_of(drawn["distributions"])[:3] == [
+        "700.1 in all 120 runs", "_limit of 2020", "far (1e+250, beyond the picture)",
+    ]  # fmt: skip
+    low, high = drawn["distributions"].axes[0].get_xlim()
+    assert 600.0 < low < 650.0 and 700.1 < high < 750.0
+    low, high = drawn["convergence"].axes[0].get_ylim()
+    assert 600.0 < low < 700.0 < high < 800.0
+
+
+def test_an_output_without_a_value_is_said_to_have_none(
+    sources: dict[str, ResultsFolder], tmp_path: Path
+) -> None:
+    source = sources["monte-carlo"]
+    none = copy_of(source, tmp_path / "none", source.runs().assign(hic15=np.nan))
+    answer = mcstudy("report", none.path)
+    assert answer.code == 0, answer.err
+    assert "HIC15: no run has a value." in words_of(none)
+
+
+def test_sobol_says_and_hatches_a_constant(tmp_path: Path, drawn: Figures) -> None:
+    folder = ran(study_text("sobol", DESIGNS["sobol"]), tmp_path / "out")
+    text = words_of(folder)
+    assert "HIC15 does not vary." in text
+    assert "No index is given where an output does not vary: HIC15, HIC36," in text
+    assert folder.read_json("analysis.json")["outputs"]["hic15"]["variance"] == 0.0
+    # Ten of twelve outputs are constant; three factors and the dummy.
+    assert cells_of(drawn["heatmap"]).count("–") == 4 * 10
+    assert [axes.get_title() for axes in drawn["indices"].axes] == ["peak force"]
+
+
+@pytest.mark.parametrize("row", [8, 9], ids=["a base row", "an exchanged row"])
+def test_an_output_that_hardly_ever_changes_has_indices_without_intervals(
+    row: int, sources: dict[str, ResultsFolder], tmp_path: Path, drawn: Figures
+) -> None:
+    runs = sources["sobol"].runs()
+    values = np.where(runs["run"] == row, 5.0, 1.0)
+    rare = copy_of(sources["sobol"], tmp_path / "rare", runs.assign(hic15=values))
+    answer = mcstudy("report", rare.path)
+    assert answer.code == 0, answer.err
+    assert "HIC15 hardly ever changes" in answer.line
+    assert "have no intervals" in words_of(rare)
+    assert {"indices", "heatmap", "convergence"} <= set(drawn)
+
+
+def test_morris_says_a_constant_and_draws_the_others(tmp_path: Path, drawn: Figures) -> None:
+    folder = ran(study_text("morris", DESIGNS["morris"]), tmp_path / "out")
+    assert "HIC15 does not vary." in words_of(folder)
+    factors = folder.read_json("analysis.json")["outputs"]["hic15"]["factors"]
+    assert {row["value"] for row in factors.values()} == {0.0}
+    assert [axes.get_title() for axes in drawn["mean_effects"].axes] == ["peak force"]
+
+
+@pytest.mark.parametrize("kind", ["sobol", "morris"])
+def test_a_study_of_a_constant_alone_is_reported(kind: str, tmp_path: Path, drawn: Figures) -> None:
+    text = study_text(kind, DESIGNS[kind], inputs=ONE_SPEED, outputs=("hic15",))
+    assert "HIC15 does not vary." in words_of(ran(text, tmp_path / "out"))
+    assert drawn == {}
+
+
+def test_sensitivity_of_a_finished_folder_says_a_constant(
+    sources: dict[str, ResultsFolder], tmp_path: Path
+) -> None:
+    runs = sources["monte-carlo"].runs()
+    values = 700.1 * (1.0 + 1e-15 * (runs["run"] % 5))
+    flat = copy_of(sources["monte-carlo"], tmp_path / "flat", runs.assign(hic15=values))
+    answer = mcstudy("sensitivity", flat.path)
+    assert answer.code == 0, answer.err
+    assert "HIC15 does not vary." in answer.line
+    assert answer.err == ""
+
+
+def test_a_comparison_says_and_hatches_a_constant(tmp_path: Path, drawn: Figures) -> None:
+    report = '\n[report]\noutputs = ["hic15", "peak_force"]\n'
+    folder = ran(HOODS + INPUTS + report, tmp_path / "out")
+    text = words_of(folder)
+    assert "HIC15 does not vary, by whatever model." in text
+    assert "HIC15: soft and stiff give the same value in every run." in text
+    assert "HIC15: there is no rank correlation that an input could break." in text
+    assert "does not vary" in cells_of(drawn["variance"])
+    pair = folder.read_json("analysis.json")["outputs"]["hic15"]["pairs"]["soft/stiff"]
+    assert pair["rank_correlation"]["value"] is pair["breaking"]["noise"] is None
+    assert pair["spread"]["value"] == 0.0
+
+
+def test_an_injury_study_of_a_constant_judges_no_limit(tmp_path: Path, drawn: Figures) -> None:
+    folder = ran(INJURY + INPUTS, tmp_path / "out")
+    text = words_of(folder)
+    assert text.count("the limit says nothing, as the runs cannot be told apart.") == 2
+    assert "What does not vary: HIC15." in text
+    assert "_slower [red] $x$ %" in legend_of(drawn["exceedance"])
+    assert "roc" not in drawn
+
+
+def test_a_risk_of_zero_has_no_half(tmp_path: Path) -> None:
+    def harmless(
+        argument: Mapping[str, Any], rows: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], list[str]]:
+        outputs, status = rounded(argument, rows)
+        return 0.0 * outputs, status
+
+    with (
+        mock.patch.object(evaluation, "evaluate", harmless),
+        mock.patch.object(injury, "draw", lambda *_: {}),
+    ):
+        folder = ran(INJURY + INPUTS, tmp_path / "out")
+    halved = folder.read_json("analysis.json")["speed"]["halved"]
+    assert {entry["value"] for entry in halved.values()} == {None}
+    assert "All outcomes are AIS 0, so nothing goes with them." in words_of(folder)
+
+
+def test_an_injury_study_without_a_run_left_says_where(tmp_path: Path) -> None:
+    def failing(
+        argument: Mapping[str, Any], rows: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], list[str]]:
+        outputs, _ = rounded(argument, rows)
+        return outputs + np.nan, ["time_limit"] * len(rows)
+
+    with (
+        mock.patch.object(evaluation, "evaluate", failing),
+        pytest.raises(StudyError, match="scenario reference, front car: all runs failed"),
+    ):
+        ran(INJURY + INPUTS, tmp_path / "out")
+
+
+# -- values of any size and shape -------------------------------------------------------------
+
+
+def sizes(kind: str, entry: Mapping[str, Any]) -> list[float]:
+    """Return what a kind of study finds of an output that grows with it, or does not feel it."""
+    if kind == "monte-carlo":
+        return [entry["sd"]["value"]]
+    table = entry["factors" if kind == "morris" else "total"]
+    return [row["value"] for row in table.values()]
+
+
+@pytest.mark.parametrize(
+    ("kind", "factor"), [("monte-carlo", 1e250), ("morris", 1e250), ("sobol", -1e-250)]
+)
+def test_numbers_of_any_size_are_ranked_as_others(
+    kind: str, factor: float, sources: dict[str, ResultsFolder], tmp_path: Path
+) -> None:
+    source = sources[kind]
+    runs = source.runs()
+    scaled = copy_of(source, tmp_path / "out", runs.assign(hic15=factor * runs["hic15"]))
+    found = sizes(kind, api.build_report(scaled)["outputs"]["hic15"])
+    words_of(scaled)
+    plain = sizes(kind, source.read_json("analysis.json")["outputs"]["hic15"])
+    grown = 1.0 if kind == "sobol" else abs(factor)
+    np.testing.assert_allclose(found, grown * np.array(plain), rtol=1e-9)
+
+
+def test_a_value_of_one_run_alone_is_no_distribution(
+    sources: dict[str, ResultsFolder], tmp_path: Path
+) -> None:
+    runs = sources["monte-carlo"].runs()
+    values = np.where(runs["run"] == 7, 1.0, np.nan)
+    lone = copy_of(sources["monte-carlo"], tmp_path / "out", runs.assign(hic15=values))
+    api.build_report(lone)
+    assert "HIC15: only one run has a value." in words_of(lone)
+
+
+def test_a_constant_with_holes_counts_the_runs_that_have_it(
+    sources: dict[str, ResultsFolder], tmp_path: Path
+) -> None:
+    source = sources["monte-carlo"]
+    runs = source.runs()
+    part = copy_of(source, tmp_path / "out",
+                   runs.assign(hic15=np.where(runs["run"] < 12, np.nan, 42.0)))  # fmt: skip
+    api.build_report(part)
+    assert "it is 42.00 in all 108 runs that have a value." in words_of(part)

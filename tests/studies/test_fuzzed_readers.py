@@ -252,13 +252,13 @@ def check_spoilt_cells(finished: Path, data: st.DataObject, folder: Path) -> Non
 Check = Callable[[Any, Path], None]
 PAPER = grammars.paper_studies(CONFIGS)
 READERS: dict[str, tuple[st.SearchStrategy[Any], Check, int, int]] = {
-    "study": (grammars.study_files(grammars.STUDIES), check_study, 25, 2500),
-    "paper study": (grammars.study_files(PAPER), check_study, 10, 2000),
+    "study": (grammars.study_files(grammars.STUDIES), check_study, 25, 1800),
+    "paper study": (grammars.study_files(PAPER), check_study, 10, 1500),
     "whole study": (grammars.whole_studies(), check_whole_study, 1, 150),
-    "csv": (grammars.csv_files(), check_cases, 25, 2500),
-    "parquet": (grammars.parquet_files(), partial(check_cases, ending="parquet"), 25, 2500),
-    "iso-mme": (grammars.mme_tests(), check_tests, 15, 2000),
-    "measured": (grammars.measured_folders(), check_tests, 15, 2000),
+    "csv": (grammars.csv_files(), check_cases, 25, 1200),
+    "parquet": (grammars.parquet_files(), partial(check_cases, ending="parquet"), 25, 1400),
+    "iso-mme": (grammars.mme_tests(), check_tests, 15, 900),
+    "measured": (grammars.measured_folders(), check_tests, 15, 900),
 }
 """By reader: its grammar, what is checked, files drawn by the fast and by the slow test."""
 FAST = settings(
@@ -311,7 +311,7 @@ def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
 
 
 @pytest.mark.slow
-@settings(SLOW, max_examples=40)
+@settings(SLOW, max_examples=20)
 @given(data=st.data())
 def test_a_spoilt_folder_of_cells_is_told_in_one_line(
     finished: Path, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject

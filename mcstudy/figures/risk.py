@@ -88,8 +88,10 @@ def draw_levels(
             for level, risk in levels.items():
                 above.plot(x, risk, color=LEVEL_COLOURS[level - 1], linestyle=dashes[k % 4],
                            linewidth=1.5, label=f"AIS{level}+, {title}")  # fmt: skip
-        # Counts have the density's shape, and none is too large to be drawn.
-        below.hist(stimulus, bins=60, color=style.SKY, range=(0.0, float(x[-1])))
+        # As weights: Matplotlib's own density takes differences of edges, which may vanish.
+        end, bins = float(x[-1]), 60
+        below.hist(stimulus, bins=bins, color=style.SKY, range=(0.0, end),
+                   weights=np.full(stimulus.size, bins / (end * stimulus.size)))  # fmt: skip
         if limit is not None and 0.0 <= limit <= x[-1]:
             for axes in (above, below):
                 axes.axvline(limit, color="black", linewidth=1.0, linestyle="--")

@@ -1,5 +1,6 @@
 """The models by name: a new model is one module and one line here."""
 
+import inspect
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
@@ -44,6 +45,9 @@ def load_model(
     module, factory = _MODELS[name]
     build: Callable[..., Model] = getattr(import_module(module), factory)
     chosen = dict(options or {})
+    known = [option for option in inspect.signature(build).parameters if option != "effects"]
+    if unknown := [option for option in chosen if option not in known]:
+        raise ValueError(f"model {name!r} has no option {unknown[0]!r}; it has {', '.join(known)}")
     if effects:
         chosen["effects"] = effects
     return build(**chosen)

@@ -307,3 +307,9 @@ def test_no_workers_is_a_user_error(
     )
     assert code == 2
     assert "workers" in errors
+
+
+@pytest.mark.parametrize("name", model_names())
+def test_an_unknown_option_is_named_with_those_that_there_are(name: str) -> None:
+    with pytest.raises(ValueError, match=rf"model '{name}' has no option 'colour'; it has .*veh"):
+        load_model(name, {"colour": "red"})

@@ -61,10 +61,12 @@ class _RunningMean:
         if not part.size:
             return
         total = self.count + part.size
-        shift = float(part.mean()) - self.mean
-        self.square += float(((part - part.mean()) ** 2).sum())
-        self.square += shift**2 * self.count * part.size / total
-        self.mean += shift * part.size / total
+        with np.errstate(over="ignore", invalid="ignore"):
+            # Numbers that are too large for their squares leave the width unknown.
+            shift = float(part.mean()) - self.mean
+            self.square += float(((part - part.mean()) ** 2).sum())
+            self.square += shift * shift * self.count * part.size / total
+            self.mean += shift * part.size / total
         self.count = total
 
     @property

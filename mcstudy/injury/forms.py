@@ -36,7 +36,7 @@ def _threshold(x: Array, median: float, variation: float) -> Array:
 
 
 def _log(x: Array) -> Array:
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         return np.log(x)
 
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from mcstudy import config
@@ -44,8 +45,8 @@ def measure_sensitivity(
     Raises
     ------
     UserError
-        If the folder's design is no sample of the inputs, an output is unknown, or too few runs
-        have a value.
+        If the folder's design is no sample of the inputs, an output is unknown, a run lacks an
+        input, or too few runs have a value.
     """
     study = load_study(source.path / "study.toml")
     if isinstance(study, MorrisStudy):
@@ -78,6 +79,9 @@ def measure_sensitivity(
         "main_effects": {},
     }
     values = complete[inputs].to_numpy(dtype=float)
+    for name, column in zip(inputs, values.T, strict=True):
+        if not np.isfinite(column).all():
+            raise UserError(f"{source.path}: a run has no finite value of its input {name}")
     unit_of = {item.name: item.unit for item in model.outputs}
     for name in follow(wanted, "outputs", quiet=quiet):
         column = complete[name].to_numpy(dtype=float)

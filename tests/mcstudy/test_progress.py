@@ -86,3 +86,14 @@ def test_the_widest_interval_is_that_of_the_mean_known_worst() -> None:
     # Of wad no run has a value: nothing is said of it.
     assert progress.widest == ("hic15", pytest.approx(reach, rel=1e-12))
     assert f"hic15 ± {100.0 * reach:.2g} %" in stream.getvalue()
+
+
+@pytest.mark.filterwarnings("error")
+def test_numbers_too_large_for_their_squares_leave_the_width_unknown() -> None:
+    progress = Progress(watched=("hic15",), stream=Terminal())
+    progress.start(total=40, done=0)
+    for size in (1e250, -1e250):
+        frame = arrived(ok=20)
+        frame["hic15"] *= size
+        progress.advance(frame)
+    assert progress.widest is None

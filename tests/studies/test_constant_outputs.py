@@ -265,6 +265,16 @@ def test_sensitivity_of_a_finished_folder_says_a_constant(
     assert answer.err == ""
 
 
+def test_sensitivity_to_an_input_that_is_not_finite_is_refused(
+    sources: dict[str, ResultsFolder], tmp_path: Path
+) -> None:
+    runs = sources["monte-carlo"].runs()
+    lost = copy_of(sources["monte-carlo"], tmp_path / "out", runs.assign(impact_speed=np.inf))
+    answer = mcstudy("sensitivity", lost.path)
+    assert answer.code == 2
+    assert "a run has no finite value of its input impact_speed" in answer.err
+
+
 def test_a_comparison_says_and_hatches_a_constant(tmp_path: Path, drawn: Figures) -> None:
     report = '\n[report]\noutputs = ["hic15", "peak_force"]\n'
     folder = ran(HOODS + INPUTS + report, tmp_path / "out")

@@ -26,6 +26,7 @@ from models.contact.corridor import (
     corridor_text,
 )
 from models.criteria import clip_level, contact_window, filter_cfc, head_injury_criterion
+from models.criteria.filters import settling_time
 from models.headform.identification import CHANNEL_CLASS, StiffnessFit, fit_stiffness
 from models.protocol import OK
 from models.registry import load_model
@@ -117,8 +118,11 @@ def _fit_test(data: Measured, row: int, name: str, knots: int) -> FittedTest:
         raise ValueError(f"the fitted curve cannot be simulated ({run.status})")
     head = run.histories["head"]
     since = time - fit.loop.onset
-    shown = (since > -0.002) & (since < 1.6 * fit.loop.time[-1] + 0.002)
-    simulated = np.interp(since, head.time, head.channels["acceleration"], left=0.0, right=0.0)
+    rim = max(0.002, settling_time(header.channel_class or CHANNEL_CLASS))
+    shown = (since > -rim) & (since < 1.6 * fit.loop.time[-1] + rim)
+    # With its sign: a filter swings below zero after the contact.
+    felt = head.channels["acceleration_normal"]
+    simulated = np.interp(since, head.time, felt, left=0.0, right=0.0)
     pulse = Pulse(since[shown], values[shown], simulated[shown])
     both = (_pulse_numbers(pulse.time, p) for p in (pulse.measured, pulse.simulated))
     measured, ours = both

@@ -44,6 +44,8 @@ class FittedLoop:
     permanent: float
 
 
+ENTRY = 1.75
+"""Inches that an entry of a legend takes."""
 MOST_PANELS = 12
 """Tests that get a panel of their own."""
 
@@ -171,4 +173,5 @@ def _label_outer(panels: Sequence[Axes], xlabel: str, ylabel: str) -> None:
 def _legend_above(figure: Figure, axes: Axes) -> None:
     """Put the legend of one panel above all of them."""
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), fontsize=9)
+    columns = max(1, min(len(labels), int(figure.get_figwidth() / ENTRY)))
+    figure.legend(handles, labels, loc="outside upper center", ncols=columns, fontsize=9)

@@ -9,7 +9,7 @@ MOST_DIGITS = 12
 """Decimals of a second up to which printed digits are sought."""
 EXACT = 1e-9
 """Share of a step within which times are uniform as they are."""
-ROUNDED = 0.6
+ROUNDED = 1.0
 """Printed units by which times may lie away from a uniform grid: half of one is rounding, the rest
 what the grid's two numbers leave."""
 

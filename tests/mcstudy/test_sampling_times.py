@@ -28,6 +28,13 @@ def test_times_rounded_to_printed_digits_are_uniform(
         np.testing.assert_allclose(found, true, atol=0.7 * 10.0**-digits)
 
 
+@pytest.mark.parametrize("count", [12, 20, 33])
+def test_few_times_leave_the_grid_uncertain(count: int) -> None:
+    # Of twenty times the line through them lies up to 0.6 units away from one.
+    time = np.round(1.0 + np.arange(count) / 25_600.0, 9)
+    assert np.ptp(np.diff(regular_times(time))) < 1e-12
+
+
 def test_exact_times_stay_to_the_last_bit() -> None:
     time = np.arange(-50, 500) / 1e4
     np.testing.assert_array_equal(regular_times(time), time)

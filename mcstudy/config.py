@@ -108,7 +108,7 @@ def first_problem(error: ValidationError, table: Mapping[str, Any]) -> str:
 
 
 def _place_in(
-    table: object, location: tuple[int | str, ...], *, missing: bool
+    table: Any, location: tuple[int | str, ...], *, missing: bool
 ) -> tuple[list[str], int]:
     """Return the parts of a location that the file has, and after how many another stood last.
 
@@ -124,7 +124,7 @@ def _place_in(
             else isinstance(table, Sequence) and isinstance(part, int) and part < len(table)
         )
         if inside:
-            table = table[part]  # type: ignore[index]
+            table = table[part]
             parts.append(str(part))
         elif missing and k == len(location) - 1:
             parts.append(str(part))

@@ -29,11 +29,10 @@ from models.headform.impact import (
     Surface,
     strike,
 )
+from models.headform.outcome import SAMPLING_RATE
 
 Array = NDArray[np.float64]
 
-RATE = 20_000.0
-"""Hz at which the simulated signal is filtered."""
 STRIDE = 5
 """Steps of the simulation a sample."""
 LONGEST = 0.15
@@ -163,19 +162,19 @@ def _simulate(signal: _Signal, parameters: Array) -> tuple[Array, Array, float] 
     """
     laws = np.zeros((1, KNOTS, 4))
     count = law_of(_curve_of(parameters), laws[0])
-    record, summary = np.empty((round(LONGEST * RATE), COLUMNS)), np.zeros(SUMMARY)
+    record, summary = np.empty((round(LONGEST * SAMPLING_RATE), COLUMNS)), np.zeros(SUMMARY)
     strike(
         Impactor(signal.mass, 1.0, 1.0), Surface(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.01),
-        laws, count, signal.speed, 0.0, 1.0 / (RATE * STRIDE), STRIDE, record, summary,
+        laws, count, signal.speed, 0.0, 1.0 / (SAMPLING_RATE * STRIDE), STRIDE, record, summary,
     )  # fmt: skip
     if math.isnan(summary[END_TIME]):
         return None
     samples = int(summary[SAMPLES])
-    room = round(settling_time(signal.channel_class) * RATE) + 1
+    room = round(settling_time(signal.channel_class) * SAMPLING_RATE) + 1
     raw = np.zeros(samples + 2 * room)
     raw[room : room + samples] = record[:samples, NORMAL] / (signal.mass * STANDARD_GRAVITY)
-    filtered = filter_cfc(raw, RATE, signal.channel_class)
-    since = (np.arange(raw.size) - room) / RATE
+    filtered = filter_cfc(raw, SAMPLING_RATE, signal.channel_class)
+    since = (np.arange(raw.size) - room) / SAMPLING_RATE
     at = signal.time - 1e-3 * parameters[0]
     both = (np.interp(at, since, values, left=0.0, right=0.0) for values in (raw, filtered))
     return next(both), next(both), float(summary[DEEPEST])

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from mcstudy import config
-from mcstudy.config import CommonStudy, ModelComparison, SampledStudy, load_study
+from mcstudy.config import CommonStudy, ModelComparison, SampledStudy, parse_study
 from mcstudy.errors import UserError
 from mcstudy.files import read_study_text
 from mcstudy.inputs import Distribution
@@ -58,11 +58,11 @@ def choose_model(data: Measured, file: Path | None) -> ModelChoice:
     fixed: dict[str, float] = {}
     study, text = None, ""
     if file is not None:
-        chosen = load_study(file)
+        text = read_study_text(file)
+        chosen = parse_study(text, str(file))
         if isinstance(chosen, ModelComparison):
             raise UserError(f"{file}: a model-comparison has several models; give a study of one")
         study = chosen
-        text = read_study_text(file)
         if study.model.name != header.model:
             raise UserError(
                 f"{file}: model.name is {study.model.name!r}, but the data are of {header.model!r}"

@@ -4,6 +4,7 @@ SciPy maximises the same likelihood with other code, by a simplex in other param
 """
 
 import warnings
+from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
@@ -19,6 +20,7 @@ from mcstudy.injury.survival import FAMILIES, RiskFit, fit_risk_curve
 from mcstudy.injury.turnbull import estimate_steps
 
 Array = NDArray[np.float64]
+Shape = Callable[[int, int], Observations]
 
 DISTRIBUTIONS = {
     "log-normal": stats.lognorm,
@@ -110,7 +112,9 @@ def scipy_fit(family: str, held: Observations) -> tuple[float, float, float]:
 @pytest.mark.parametrize("n", SIZES)
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("family", FAMILIES)
-def test_every_shape_has_the_curve_of_greatest_likelihood(family: str, shape, n: int) -> None:  # type: ignore[no-untyped-def]
+def test_every_shape_has_the_curve_of_greatest_likelihood(
+    family: str, shape: Shape, n: int
+) -> None:
     held = check(shape(n, 3))
     fit = fit_risk_curve(held, family)
     theirs, slope, median = scipy_fit(family, held)
@@ -152,7 +156,7 @@ def repeated(held: Observations, counts: NDArray[np.int64]) -> Observations:
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("family", FAMILIES)
-def test_whole_weights_count_equal_cases(family: str, shape) -> None:  # type: ignore[no-untyped-def]
+def test_whole_weights_count_equal_cases(family: str, shape: Shape) -> None:
     held = shape(12, 1)
     counts = np.random.default_rng(4).integers(1, 5, 12)
     weighted = Observations(held.low, held.high, counts.astype(float))

@@ -12,10 +12,15 @@ EXACT = 1e-9
 ROUNDED = 1.0
 """Printed units by which times may lie away from a uniform grid: half of one is rounding, the rest
 what the grid's two numbers leave."""
+STEP_IN_UNITS = 1.5
+"""Printed units in a step from which a missing line shows in the steps: two steps then print at
+least two units longer than the shortest."""
 
 
 def regular_times(time: Array) -> Array:
     """Return times on the uniform grid that they were rounded from, or as they are.
+
+    Steps between rounded times differ by one printed unit at most; a missing line makes one longer.
 
     Parameters
     ----------
@@ -30,7 +35,9 @@ def regular_times(time: Array) -> Array:
     if away <= EXACT * step:
         return time
     unit = _printed_unit(time)
-    return grid if unit < step and away <= ROUNDED * unit else time
+    even = float(np.ptp(np.diff(time))) < 1.5 * unit
+    seen = step >= STEP_IN_UNITS * unit
+    return grid if even and seen and away <= ROUNDED * unit else time
 
 
 def _printed_unit(time: Array) -> float:

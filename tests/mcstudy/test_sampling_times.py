@@ -47,6 +47,17 @@ def test_times_that_are_not_uniform_stay_as_they_are(digits: int) -> None:
     np.testing.assert_array_equal(regular_times(time), time)
 
 
-def test_a_missing_sample_is_no_rounding() -> None:
-    time = np.delete(np.round(np.arange(300) / 12_800.0, 6), 100)
-    np.testing.assert_array_equal(regular_times(time), time)
+@QUIET
+@given(
+    rate=st.sampled_from([10_000.0, 12_800.0, 51_200.0, 65_536.0, 20_000.0 / 3.0]),
+    digits=st.integers(4, 9),
+    count=st.integers(12, 4000),
+    share=st.floats(0.0, 1.0),
+)
+def test_a_missing_sample_is_no_rounding(
+    rate: float, digits: int, count: int, share: float
+) -> None:
+    whole = np.round(np.arange(count) / rate, digits)
+    time = np.delete(whole, 2 + int(share * (count - 4)))
+    if np.all(np.diff(time) > 0.0):
+        np.testing.assert_array_equal(regular_times(time), time)

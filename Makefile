@@ -23,7 +23,7 @@ study: install  ## run the main job: the nominal case and the Monte Carlo study 
 	$(BIN)/mcstudy run configs/paper_study.toml
 
 diagnose-demo: install  ## hide an effect in tests, find it, extend the model, run the injury study again
-	$(BIN)/python -m studies.diagnosis.demo
+	$(BIN)/python -m scripts.diagnosis_demo
 
 case: install  ## run the nominal case only
 	$(BIN)/mcstudy reconstruct configs/paper_case.toml
@@ -44,10 +44,10 @@ benchmark: install  ## time a step and a crash, ours and MuJoCo's, in one run
 	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-only -s
 
 gallery: install  ## remake the pictures of the README from the real study
-	$(BIN)/python -m studies.gallery
+	$(BIN)/python -m scripts.gallery
 
 calibrate: install  ## calibrate to the case's tables again and print the values
-	$(BIN)/python -m studies.paper_calibration
+	$(BIN)/python -m scripts.paper_calibration
 
 lock: install  ## lock the newest versions that pyproject.toml allows
 	$(BIN)/python -m pip install --quiet uv

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from mcstudy import seeds
+from mcstudy.sampling import seeds
 from mcstudy.statistics import REACH, ROUNDING, Estimate, between_replicates, scale_of, varies
 
 Array = NDArray[np.float64]

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mcstudy.config import ModelComparison, Reconstruction, Study, load_study, parse_study
 from mcstudy.errors import UserError
+from mcstudy.execution.results import ResultsFolder
+from mcstudy.execution.workers import Workers
 from mcstudy.files import read_study_text
 from mcstudy.report import Table
-from mcstudy.results import ResultsFolder
-from mcstudy.workers import Workers
+from mcstudy.studyfile.config import ModelComparison, Reconstruction, Study, load_study, parse_study
 from models.protocol import Run
 from studies.execution import columns_of, load_study_model
 from studies.injury import report as injury_report
@@ -63,7 +63,8 @@ PIPELINES = {
         model_comparison_report.summarise,
     ),
 }
-"""A new kind of study is its modules, its class in ``mcstudy.schema`` and one line here."""
+"""A new kind of study is its modules, its class in
+``mcstudy.studyfile.schema`` and one line here."""
 
 
 def results_folder(study: Study, out: Path | str | None = None) -> ResultsFolder:

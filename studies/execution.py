@@ -11,8 +11,17 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mcstudy import config, runner
-from mcstudy.config import (
+from mcstudy.errors import UserError
+from mcstudy.execution import runner
+from mcstudy.execution.failures import endings, locate_failures
+from mcstudy.execution.progress import Progress
+from mcstudy.execution.results import ResultsFolder, check_failures, digest, status_counts
+from mcstudy.execution.workers import Workers, at_work
+from mcstudy.figures import style
+from mcstudy.report import Section, render
+from mcstudy.sensitivity.blocks import FEWEST_BLOCKS
+from mcstudy.studyfile import config
+from mcstudy.studyfile.config import (
     CommonStudy,
     FactorStudy,
     InjuryStudy,
@@ -20,17 +29,9 @@ from mcstudy.config import (
     MonteCarloStudy,
     SampledStudy,
 )
-from mcstudy.errors import UserError
-from mcstudy.failures import endings, locate_failures
-from mcstudy.figures import style
-from mcstudy.progress import Progress
-from mcstudy.report import Section, render
-from mcstudy.results import ResultsFolder, check_failures, digest, status_counts
-from mcstudy.sensitivity.blocks import FEWEST_BLOCKS
-from mcstudy.workers import Workers, at_work
 from models.protocol import Model, complete_status
 from models.registry import load_model
-from studies import evaluation
+from studies import worker as evaluation
 
 PACKAGES = ("numpy", "scipy", "numba", "pandas", "joblib", "pyarrow", "salib")
 

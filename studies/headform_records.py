@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcstudy import units
-from mcstudy.measured import Measured, Signal
+from mcstudy.measurement.measured_data import Measured, Signal
 from models.criteria.filters import settling_time
 from models.headform.identification import CHANNEL_CLASS, check_uniform
 from models.headform.record import Impact, first_impact

@@ -7,8 +7,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mcstudy import units
-from mcstudy.config import SampledStudy
 from mcstudy.sensitivity.main_effects import main_effect
+from mcstudy.studyfile.config import SampledStudy
 from models.protocol import Model
 
 

@@ -6,16 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from mcstudy import config, units
-from mcstudy.config import ComparisonTable, Reconstruction
+from mcstudy import units
 from mcstudy.errors import StudyError, UserError
+from mcstudy.execution.results import ResultsFolder
 from mcstudy.figures import crash, stiffness, style
 from mcstudy.report import Section, Table, render
-from mcstudy.results import ResultsFolder
+from mcstudy.studyfile import config
+from mcstudy.studyfile.config import ComparisonTable, Reconstruction
 from mcstudy.text import number, quantity, unit
 from models.protocol import Model, Run, complete_status
-from studies.exchange import write_isomme
 from studies.execution import load_study_model
+from studies.isomme_export import write_isomme
 
 PRIMARY = 0.12
 """s after first contact that the histories show: the impact on the car."""

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from mcstudy import units
 from mcstudy.errors import UserError
+from mcstudy.execution.progress import follow
+from mcstudy.execution.results import ResultsFolder
 from mcstudy.figures import stiffness as pictures
 from mcstudy.figures import style
-from mcstudy.measured import Measured, load_measured
-from mcstudy.progress import follow
+from mcstudy.measurement.measured_data import Measured, load_measured
 from mcstudy.report import Section, Table, render
-from mcstudy.results import ResultsFolder
 from mcstudy.text import interval, number
 from models.contact.corridor import (
     FEWEST_CURVES,
@@ -182,7 +182,8 @@ def fit_stiffness_of(
     zone : name of the zone in the corridor file.
     method : ``quantiles`` or ``components``, how the corridor is built.
     knots : most knots of a curve.
-    channels : of ISO-MME tests, which to take; see ``mcstudy.isomme.head_acceleration``.
+    channels : of ISO-MME tests, which to take; see
+        ``mcstudy.measurement.isomme.head_acceleration``.
 
     Returns
     -------

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy import seeds
+from mcstudy.sampling import seeds
 from mcstudy.sensitivity.delta import delta
 from mcstudy.sensitivity.pawn import pawn
 from mcstudy.sensitivity.rank_based import rank_first_order

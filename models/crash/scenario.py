@@ -6,8 +6,8 @@ It is the same for every crash model, so that models differ by their method alon
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from models.contact.road import Road
 from models.crash.ellipsoids import Ellipsoids, build_ellipsoids
-from models.crash.road import Road
 from models.effects.chain import EffectChain
 from models.pedestrian.anthropometry import Body, build_body
 from models.pedestrian.joints import Joints, build_joints

@@ -8,7 +8,7 @@ part.
 from collections.abc import Mapping
 from dataclasses import replace
 
-from models.headform.contact import HeadformContact
+from models.contact.headform import HeadformContact
 
 
 def apply(contact: HeadformContact, parameters: Mapping[str, float]) -> HeadformContact:

@@ -7,7 +7,7 @@ University, 1957; with exponent 1 a relative viscosity), and is nothing at rest.
 from collections.abc import Mapping
 from dataclasses import replace
 
-from models.headform.contact import HeadformContact
+from models.contact.headform import HeadformContact
 
 ONSET = 0.002
 """m over which a dashpot fades in where the hood has none of its own (assumed: the force of a hood

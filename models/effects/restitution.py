@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from models.crash.road import Road
+from models.contact.road import Road
 
 
 def apply(road: Road, parameters: Mapping[str, float]) -> Road:

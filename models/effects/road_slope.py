@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 
-from models.crash.road import Road
+from models.contact.road import Road
 from models.criteria.units import STANDARD_GRAVITY
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from models import data
 from models.contact.corridor import Corridor, load_corridors
+from models.contact.headform import HeadformContact
 from models.contact.law import (
     DAMPING_ONSET,
     KNOTS,
@@ -26,7 +27,6 @@ from models.effects.chain import build_chain
 from models.effects.reading import Reading, Record, record_reading
 from models.effects.registry import effects_of
 from models.headform import outcome
-from models.headform.contact import HeadformContact
 from models.headform.impact import (
     COLUMNS,
     DEEPEST,

@@ -12,8 +12,8 @@ import pymunk
 from numpy.typing import NDArray
 from pymunk.batch import BodyFields, Buffer, get_space_bodies
 
+from models.contact.road import Road
 from models.crash.ellipsoids import Ellipsoids
-from models.crash.road import Road
 from models.planar.body import PlanarBody, outline
 from models.planar.chipmunk import READ_BODY, WRITE_BODY, address_of, transfer
 from models.planar.joints import PlanarJoints

@@ -14,14 +14,15 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from mcstudy import config, seeds
-from mcstudy.config import MonteCarloStudy
 from mcstudy.diagnosis.problem import Cause, Form, Problem, Scalar, Test, Unknown, value_at
 from mcstudy.errors import StudyError, UserError
+from mcstudy.execution.progress import follow
 from mcstudy.injury.ais import Mechanism, draw_ais, mix
 from mcstudy.injury.functions import risk_function
-from mcstudy.measured import HEADER, Measured
-from mcstudy.progress import follow
+from mcstudy.measurement.measured_data import HEADER, Measured
+from mcstudy.sampling import seeds
+from mcstudy.studyfile import config
+from mcstudy.studyfile.config import MonteCarloStudy
 from models.protocol import Model
 from models.registry import load_model
 from studies.diagnosis.emulator import (
@@ -33,7 +34,7 @@ from studies.diagnosis.emulator import (
     quadratic_terms,
 )
 from studies.diagnosis.model_choice import ModelChoice
-from studies.evaluation import evaluate
+from studies.worker import evaluate
 
 Array = NDArray[np.float64]
 

@@ -5,9 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from mcstudy import config, designs, seeds, statistics
-from mcstudy.config import MonteCarloStudy, SobolStudy, parse_study
+from mcstudy import statistics
+from mcstudy.sampling import designs, seeds
 from mcstudy.sensitivity.rank_based import rank_first_order
+from mcstudy.studyfile import config
+from mcstudy.studyfile.config import MonteCarloStudy, SobolStudy, parse_study
 from models.protocol import complete_status
 from studies.execution import load_study_model
 

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from mcstudy.config import InjuryStudy, MonteCarloStudy, SobolStudy, parse_study
 from mcstudy.diagnosis.problem import Problem
-from mcstudy.measured import Measured
+from mcstudy.measurement.measured_data import Measured
 from mcstudy.statistics import REACH
+from mcstudy.studyfile.config import InjuryStudy, MonteCarloStudy, SobolStudy, parse_study
 from models.registry import load_model
 from studies.diagnosis.model_choice import ModelChoice
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from mcstudy import config
-from mcstudy.config import CommonStudy, ModelComparison, SampledStudy, parse_study
 from mcstudy.errors import UserError
 from mcstudy.files import read_study_text
-from mcstudy.inputs import Distribution
-from mcstudy.measured import HEADER, Measured
+from mcstudy.measurement.measured_data import HEADER, Measured
+from mcstudy.studyfile import config
+from mcstudy.studyfile.config import CommonStudy, ModelComparison, SampledStudy, parse_study
+from mcstudy.studyfile.distributions import Distribution
 from models.registry import load_model, model_names
 
 

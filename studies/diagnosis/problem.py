@@ -13,8 +13,8 @@ from mcstudy.diagnosis.channels import computed_channels
 from mcstudy.diagnosis.noise import estimate_noise
 from mcstudy.diagnosis.problem import Problem, Quantile, Scalar, Signal, Test, Unknown
 from mcstudy.errors import UserError
-from mcstudy.inputs import Distribution
-from mcstudy.measured import HEADER, Measured
+from mcstudy.measurement.measured_data import HEADER, Measured
+from mcstudy.studyfile.distributions import Distribution
 from models.criteria.filters import settling_time
 from models.criteria.units import STANDARD_GRAVITY
 from models.protocol import Model

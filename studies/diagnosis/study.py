@@ -16,13 +16,13 @@ from mcstudy.diagnosis.problem import Cause, Problem
 from mcstudy.diagnosis.regions import locate_misfit
 from mcstudy.diagnosis.search import Finding, search
 from mcstudy.errors import UserError
-from mcstudy.measured import Measured, load_measured
-from mcstudy.progress import say
-from mcstudy.results import ResultsFolder
+from mcstudy.execution.progress import say
+from mcstudy.execution.results import ResultsFolder
+from mcstudy.measurement.measured_data import Measured, load_measured
 from models.criteria import head_injury_criterion
 from studies.diagnosis import conclusions, extension, pictures
 from studies.diagnosis.accidents import build_collection, is_collection
-from studies.diagnosis.catalogue import causes_of, stage_of
+from studies.diagnosis.causes import causes_of, stage_of
 from studies.diagnosis.emulator import Emulator
 from studies.diagnosis.extras import extras_of
 from studies.diagnosis.model_choice import ModelChoice, choose_model
@@ -59,7 +59,8 @@ def diagnose(
     source : folder of measured data or of ISO-MME tests.
     folder : where the diagnosis goes.
     model_config : study file whose model is diagnosed; by default the model that the data name.
-    channels : of ISO-MME tests, which to take; see ``mcstudy.isomme.head_acceleration``.
+    channels : of ISO-MME tests, which to take; see
+        ``mcstudy.measurement.isomme.head_acceleration``.
     seed : of the simulated data sets. workers : processes, -1 for one a core.
     quiet : print no progress.
 

@@ -7,22 +7,24 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mcstudy import seeds
-from mcstudy.config import InjuryStudy
 from mcstudy.errors import StudyError
 from mcstudy.injury.ais import LEVELS, Mechanism, combine, distribution, draw_ais, exceedance, mix
 from mcstudy.injury.association import fit_proportional_odds, rank_correlations
 from mcstudy.injury.classifier import judge_limit, receiver_operating_characteristic
 from mcstudy.injury.functions import RiskFunction
-from mcstudy.schema import AS_IT_STANDS, HEAD, REFERENCE
+from mcstudy.sampling import seeds
 from mcstudy.statistics import Estimate, between_replicates, varies
+from mcstudy.studyfile.config import InjuryStudy
+from mcstudy.studyfile.schema import AS_IT_STANDS, HEAD, REFERENCE
 from models.protocol import Model
-from studies.cells import BATCHES, batch_of
 from studies.injury.cells import fronts_of
 from studies.injury.speed import describe_speed
+from studies.paired_runs import BATCHES, batch_of
 
 Array = NDArray[np.float64]
 
+CASES = "cases.parquet"
+"""Table of the cases of an injury study, in its folder."""
 PREDICTORS = ("hic15", "impact_speed", "throw_distance", "wad")
 """What the AIS is set against, where a model has it."""
 

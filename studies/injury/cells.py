@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mcstudy.config import InjuryStudy, MonteCarloStudy
-from mcstudy.schema import AS_IT_STANDS, REFERENCE, Front, Report, Scenario
+from mcstudy.studyfile.config import InjuryStudy, MonteCarloStudy
+from mcstudy.studyfile.schema import AS_IT_STANDS, REFERENCE, Front, Report, Scenario
 
 
 @dataclass(frozen=True)

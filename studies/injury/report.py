@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mcstudy.config import InjuryStudy
 from mcstudy.figures import risk, style
 from mcstudy.injury.functions import RiskFunction, speed_curves
 from mcstudy.report import Section, Table
-from mcstudy.schema import REFERENCE
+from mcstudy.studyfile.config import InjuryStudy
+from mcstudy.studyfile.schema import REFERENCE
 from mcstudy.text import capital, interval, number, percent
 from studies.failure_report import failure_map, failures_said, status_table
 from studies.injury.analysis import ages_of, proportional

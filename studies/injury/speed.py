@@ -8,11 +8,11 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import optimize
 
-from mcstudy import seeds
-from mcstudy.config import InjuryStudy
 from mcstudy.figures.style import words
-from mcstudy.schema import REFERENCE
-from studies.cells import batch_of
+from mcstudy.sampling import seeds
+from mcstudy.studyfile.config import InjuryStudy
+from mcstudy.studyfile.schema import REFERENCE
+from studies.paired_runs import batch_of
 
 Array = NDArray[np.float64]
 

@@ -9,19 +9,18 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mcstudy import config
-from mcstudy.config import InjuryStudy, load_study
 from mcstudy.errors import UserError
+from mcstudy.execution.results import ResultsFolder
+from mcstudy.execution.workers import Workers
 from mcstudy.injury.functions import RiskFunction, risk_function
-from mcstudy.results import ResultsFolder
-from mcstudy.workers import Workers
+from mcstudy.studyfile import config
+from mcstudy.studyfile.config import InjuryStudy, load_study
 from models.protocol import Model
-from studies.cells import PreparedCell, cell_folder, cell_runs, run_cells
 from studies.execution import judge_runs, load_study_model, publish
-from studies.injury.analysis import analyse, outcomes_of
+from studies.injury.analysis import CASES, analyse, outcomes_of
 from studies.injury.cells import Cell, cells_of
 from studies.injury.report import draw, sections_of
-from studies.risk_curve import CASES
+from studies.paired_runs import PreparedCell, cell_folder, cell_runs, run_cells
 
 
 def run_injury(

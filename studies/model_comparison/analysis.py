@@ -9,16 +9,17 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mcstudy import config, units
+from mcstudy import units
 from mcstudy.agreement import breaking_inputs, compare, split_variance, without_rounding
-from mcstudy.config import ModelComparison
 from mcstudy.errors import StudyError, UserError
-from mcstudy.results import check_failures, status_counts
+from mcstudy.execution.results import check_failures, status_counts
 from mcstudy.sensitivity.given_data import FEWEST_RUNS, measure_given_data
 from mcstudy.statistics import Estimate, scale_of, varies
+from mcstudy.studyfile import config
+from mcstudy.studyfile.config import ModelComparison
 from models.protocol import Model, complete_status
-from studies.cells import batch_of
 from studies.execution import describe_ends
+from studies.paired_runs import batch_of
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 
 from mcstudy import units
-from mcstudy.config import ModelComparison
 from mcstudy.figures import agreement, crash, style
 from mcstudy.report import Section, Table
+from mcstudy.studyfile.config import ModelComparison
 from mcstudy.text import capital, interval, number, quantity, unit
 from models.protocol import Model, Scene
 from studies.failure_report import failure_map, failures_said, status_table

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from mcstudy import config
-from mcstudy.config import ModelComparison, MonteCarloStudy, load_study
 from mcstudy.errors import UserError
-from mcstudy.results import ResultsFolder
-from mcstudy.schema import Report
-from mcstudy.workers import Workers
+from mcstudy.execution.results import ResultsFolder
+from mcstudy.execution.workers import Workers
+from mcstudy.studyfile import config
+from mcstudy.studyfile.config import ModelComparison, MonteCarloStudy, load_study
+from mcstudy.studyfile.schema import Report
 from models.protocol import Model, Run
-from studies.cells import PreparedCell, cell_folder, cell_runs, run_cells
 from studies.execution import load_study_model, publish
 from studies.model_comparison.analysis import analyse, published_methods
 from studies.model_comparison.report import draw, sections_of
+from studies.paired_runs import PreparedCell, cell_folder, cell_runs, run_cells
 
 NOMINAL = "nominal.json"
 """Outputs and pictures' poses of the nominal run of a model, in its cell."""

@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 
 from mcstudy import units
-from mcstudy.config import MonteCarloStudy
 from mcstudy.figures import style
 from mcstudy.report import Section, Table
+from mcstudy.studyfile.config import MonteCarloStudy
 from mcstudy.text import capital, interval, number, percent, quantity, unit
 from models.protocol import Model
 from studies.failure_report import failures_said, status_table

@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mcstudy import config, statistics, units
-from mcstudy.config import MonteCarloStudy, load_study
+from mcstudy import statistics, units
 from mcstudy.errors import UserError
+from mcstudy.execution.results import ResultsFolder
+from mcstudy.execution.workers import Workers
 from mcstudy.figures import distributions, relations
-from mcstudy.results import ResultsFolder
-from mcstudy.workers import Workers
+from mcstudy.studyfile import config
+from mcstudy.studyfile.config import MonteCarloStudy, load_study
 from models.protocol import Model, complete_status
 from studies.execution import columns_of, describe_runs, load_study_model, publish, run_rows
 from studies.failure_report import failure_map

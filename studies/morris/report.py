@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from typing import Any
 
-from mcstudy.config import MorrisStudy
 from mcstudy.figures import screening, style
 from mcstudy.report import Section, Table
-from mcstudy.sensitivity.factors import DUMMY, NUDGE
-from mcstudy.sensitivity.morris import TAIL
+from mcstudy.sampling.factors import DUMMY, NUDGE
+from mcstudy.sampling.morris import TAIL
+from mcstudy.studyfile.config import MorrisStudy
 from mcstudy.text import capital, interval, number, unit
 from models.protocol import Model
 from studies.factor_report import groups_said

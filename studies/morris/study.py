@@ -4,14 +4,15 @@ from typing import Any
 
 import pandas as pd
 
-from mcstudy import config
-from mcstudy.config import MorrisStudy, load_study
 from mcstudy.errors import StudyError, UserError
-from mcstudy.results import ResultsFolder
+from mcstudy.execution.results import ResultsFolder
+from mcstudy.execution.workers import Workers
+from mcstudy.sampling.morris import draw_trajectories
 from mcstudy.sensitivity.blocks import is_enough, whole_blocks
-from mcstudy.sensitivity.morris import ElementaryEffects, draw_trajectories, estimate_effects
+from mcstudy.sensitivity.morris import ElementaryEffects, estimate_effects
 from mcstudy.statistics import Estimate
-from mcstudy.workers import Workers
+from mcstudy.studyfile import config
+from mcstudy.studyfile.config import MorrisStudy, load_study
 from models.protocol import Model
 from studies.execution import judge_runs, load_study_model, publish, run_rows, whole_prefix
 from studies.morris.report import draw, sections_of

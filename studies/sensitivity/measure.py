@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mcstudy import config
-from mcstudy.config import MonteCarloStudy, MorrisStudy, SobolStudy, load_study
 from mcstudy.errors import UserError
-from mcstudy.progress import follow
-from mcstudy.results import ResultsFolder
+from mcstudy.execution.progress import follow
+from mcstudy.execution.results import ResultsFolder
+from mcstudy.sampling.saltelli import is_base_row
 from mcstudy.sensitivity.given_data import measure_given_data
-from mcstudy.sensitivity.saltelli import is_base_row
 from mcstudy.statistics import Estimate
+from mcstudy.studyfile import config
+from mcstudy.studyfile.config import MonteCarloStudy, MorrisStudy, SobolStudy, load_study
 from models.protocol import complete_status
 from studies.execution import columns_of, load_study_model, publish
 from studies.main_effects import main_effects_of

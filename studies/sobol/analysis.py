@@ -8,14 +8,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mcstudy import config, seeds
-from mcstudy.config import SobolStudy
 from mcstudy.errors import StudyError
+from mcstudy.sampling import seeds
+from mcstudy.sampling.factors import DUMMY, factors_of
+from mcstudy.sampling.saltelli import block_size, is_base_row
 from mcstudy.sensitivity.blocks import FEWEST_BLOCKS, is_enough, outputs_alike, whole_blocks
-from mcstudy.sensitivity.factors import DUMMY, factors_of
-from mcstudy.sensitivity.saltelli import block_size, is_base_row
 from mcstudy.sensitivity.sobol import Indices, estimate_indices, split_blocks
 from mcstudy.statistics import Estimate
+from mcstudy.studyfile import config
+from mcstudy.studyfile.config import SobolStudy
 from models.protocol import Model
 from studies.execution import judge_runs
 from studies.main_effects import main_effects_of

@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from typing import Any
 
-from mcstudy.config import SobolStudy
 from mcstudy.figures import sensitivity, style
 from mcstudy.report import Section, Table
-from mcstudy.sensitivity.factors import DUMMY, NUDGE
-from mcstudy.sensitivity.saltelli import SCRAMBLES
+from mcstudy.sampling.factors import DUMMY, NUDGE
+from mcstudy.sampling.saltelli import SCRAMBLES
+from mcstudy.studyfile.config import SobolStudy
 from mcstudy.text import capital, quantity, share
 from models.protocol import Model
 from studies.factor_report import groups_said

@@ -3,13 +3,13 @@
 import math
 from typing import Any
 
-from mcstudy import config
-from mcstudy.config import SobolStudy, load_study
 from mcstudy.errors import UserError
-from mcstudy.progress import say
-from mcstudy.results import ResultsFolder
-from mcstudy.sensitivity.saltelli import draw_saltelli
-from mcstudy.workers import Workers
+from mcstudy.execution.progress import say
+from mcstudy.execution.results import ResultsFolder
+from mcstudy.execution.workers import Workers
+from mcstudy.sampling.saltelli import draw_saltelli
+from mcstudy.studyfile import config
+from mcstudy.studyfile.config import SobolStudy, load_study
 from studies.execution import load_study_model, publish, run_rows, whole_prefix
 from studies.sobol.analysis import analyse, widest_interval
 from studies.sobol.report import draw, sections_of

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from mcstudy.progress import follow
+from mcstudy.execution.progress import follow
 from models.registry import load_model
 from studies.validation import (
     body_parts,

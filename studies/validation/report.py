@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from mcstudy.errors import StudyError, UserError
+from mcstudy.execution.results import ResultsFolder
 from mcstudy.figures import style
 from mcstudy.report import Section, Table, render
-from mcstudy.results import ResultsFolder
 from mcstudy.text import quantity
 from studies.validation.check import INSIDE, NOT_RUN, OUTSIDE, Check, Part
 from studies.validation.parts import part_names, run_parts

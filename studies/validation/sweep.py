@@ -9,7 +9,7 @@ from joblib import Parallel, delayed
 
 from models.protocol import complete_inputs
 from models.registry import load_model
-from studies.evaluation import ModelArgument, evaluate
+from studies.worker import ModelArgument, evaluate
 
 CHUNK = 12
 """Runs a task."""

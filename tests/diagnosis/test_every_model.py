@@ -10,11 +10,11 @@ from mcstudy.diagnosis.problem import Cause
 from mcstudy.diagnosis.screening import score_templates
 from mcstudy.diagnosis.search import fit_base, search
 from mcstudy.diagnosis.templates import all_forms, cause_templates
-from mcstudy.isomme import write_test
-from mcstudy.measured import load_measured
-from mcstudy.results import ResultsFolder
+from mcstudy.execution.results import ResultsFolder
+from mcstudy.measurement.isomme import write_test
+from mcstudy.measurement.measured_data import load_measured
 from studies.diagnosis import accidents
-from studies.diagnosis.catalogue import causes_of
+from studies.diagnosis.causes import causes_of
 from studies.diagnosis.model_choice import choose_model
 from studies.diagnosis.problem import build_problem
 from studies.diagnosis.study import diagnose, simulation_of

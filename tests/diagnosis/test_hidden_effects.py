@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mcstudy.measured import load_measured
+from mcstudy.measurement.measured_data import load_measured
 from models.registry import load_model
 from studies.validation.diagnosis.drawing import CATALOGUE, KINDS, OUTSIDE, draw
 from studies.validation.diagnosis.hidden_effects import CURVE, Hidden, Laboratory, make_tests

@@ -7,9 +7,10 @@ import joblib
 import numpy as np
 import toy_evaluation
 
-from mcstudy import designs, runner
-from mcstudy.progress import Progress
-from mcstudy.results import ResultsFolder
+from mcstudy.execution import runner
+from mcstudy.execution.progress import Progress
+from mcstudy.execution.results import ResultsFolder
+from mcstudy.sampling import designs
 
 N = 400
 SLOWNESS = 0.006

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from test_faults import complete
 
-from mcstudy import runner
 from mcstudy.errors import StudyError, UserError
-from mcstudy.progress import Progress
-from mcstudy.results import ResultsFolder, digest
-from mcstudy.workers import at_work
+from mcstudy.execution import runner
+from mcstudy.execution.progress import Progress
+from mcstudy.execution.results import ResultsFolder, digest
+from mcstudy.execution.workers import at_work
 
 pytest.importorskip("distributed")
 HERE = Path(__file__).parent
@@ -110,7 +110,7 @@ def test_a_cluster_without_workers_is_told_and_what_arrived_goes_on(
     cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(runner, "CHUNK_TIME", 0.05)
-    monkeypatch.setattr("mcstudy.cluster.GRACE", 1.0)
+    monkeypatch.setattr("mcstudy.execution.cluster.GRACE", 1.0)
     folder = ResultsFolder(tmp_path / "study")
 
     def kill_both() -> None:
@@ -131,7 +131,7 @@ def test_a_cluster_without_workers_is_told_and_what_arrived_goes_on(
 
 
 def test_no_scheduler_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mcstudy.cluster.CONNECT_TIME", 1.0)
+    monkeypatch.setattr("mcstudy.execution.cluster.CONNECT_TIME", 1.0)
     for address in ("tcp://127.0.0.1:9", "nonsense", "tcp://"):
         with pytest.raises(UserError, match="--cluster") as error, at_work(address):
             pass

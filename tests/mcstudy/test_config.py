@@ -11,7 +11,8 @@ from fake_simulator import STUDY, FakeSimulator, edited
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mcstudy.config import (
+from mcstudy.errors import UserError
+from mcstudy.studyfile.config import (
     MonteCarloStudy,
     Reconstruction,
     Study,
@@ -23,7 +24,6 @@ from mcstudy.config import (
     parse_study,
     sample_inputs,
 )
-from mcstudy.errors import UserError
 from models.registry import load_model
 
 ROOT = Path(__file__).parents[2]

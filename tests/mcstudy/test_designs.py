@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mcstudy import designs
+from mcstudy.sampling import designs
 
 Array = NDArray[np.float64]
 

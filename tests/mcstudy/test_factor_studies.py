@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from fake_simulator import FakeSimulator
 
-from mcstudy.config import (
+from mcstudy.errors import UserError
+from mcstudy.sampling.factors import DUMMY, factors_of
+from mcstudy.studyfile.config import (
     FactorStudy,
     MorrisStudy,
     SobolStudy,
@@ -19,8 +21,6 @@ from mcstudy.config import (
     parse_study,
     report_outputs,
 )
-from mcstudy.errors import UserError
-from mcstudy.sensitivity.factors import DUMMY, factors_of
 from models.registry import load_model
 
 ROOT = Path(__file__).parents[2]

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from mcstudy.failures import PARTS, locate_failures
+from mcstudy.execution.failures import PARTS, locate_failures
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

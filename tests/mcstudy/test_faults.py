@@ -20,10 +20,10 @@ import pytest
 import toy_evaluation
 from test_runner import N, run, task
 
-from mcstudy import runner
-from mcstudy.chunk import read_traces
-from mcstudy.progress import Progress
-from mcstudy.results import ResultsFolder, digest
+from mcstudy.execution import runner
+from mcstudy.execution.chunk import read_traces
+from mcstudy.execution.progress import Progress
+from mcstudy.execution.results import ResultsFolder, digest
 
 GUILTY = 137
 """Run of the row that goes wrong; its x lies below that of rows without a product."""

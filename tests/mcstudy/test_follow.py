@@ -4,7 +4,7 @@ import io
 
 import pytest
 
-from mcstudy.progress import follow
+from mcstudy.execution.progress import follow
 
 
 class Terminal(io.StringIO):

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 from scipy import stats
 
-from mcstudy.config import MonteCarloStudy, load_study
-from mcstudy.inputs import (
+from mcstudy.studyfile.config import MonteCarloStudy, load_study
+from mcstudy.studyfile.distributions import (
     Distribution,
     GrowthChart,
     copula_factor,

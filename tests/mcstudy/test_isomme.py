@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mcstudy.errors import UserError
-from mcstudy.isomme import find_tests, head_acceleration, read_test, write_test
-from mcstudy.measured import load_measured
+from mcstudy.measurement.isomme import find_tests, head_acceleration, read_test, write_test
+from mcstudy.measurement.measured_data import load_measured
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from mcstudy.errors import UserError
-from mcstudy.isomme import HeadSignal, head_acceleration, read_test
-from mcstudy.measured import load_measured
+from mcstudy.measurement.isomme import HeadSignal, head_acceleration, read_test
+from mcstudy.measurement.measured_data import load_measured
 
 Array = NDArray[np.float64]
 

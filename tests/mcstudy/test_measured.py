@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mcstudy.errors import UserError
-from mcstudy.measured import Measured, load_measured
+from mcstudy.measurement.measured_data import Measured, load_measured
 
 HEADER = """\
 format = "mcstudy-measured/1"

@@ -9,15 +9,10 @@ from SALib.analyze import morris as salib_morris
 from SALib.sample import morris as salib_sample
 from scipy import integrate
 
-from mcstudy import seeds
-from mcstudy.sensitivity.factors import DUMMY, NUDGE
-from mcstudy.sensitivity.morris import (
-    TAIL,
-    ElementaryEffects,
-    Trajectories,
-    draw_trajectories,
-    estimate_effects,
-)
+from mcstudy.sampling import seeds
+from mcstudy.sampling.factors import DUMMY, NUDGE
+from mcstudy.sampling.morris import TAIL, Trajectories, draw_trajectories
+from mcstudy.sensitivity.morris import ElementaryEffects, estimate_effects
 
 Array = NDArray[np.float64]
 

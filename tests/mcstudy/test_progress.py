@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mcstudy.progress import Progress
+from mcstudy.execution.progress import Progress
 
 
 class Terminal(io.StringIO):

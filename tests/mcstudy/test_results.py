@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from mcstudy.errors import StudyError, UserError
-from mcstudy.results import ResultsFolder, check_failures, digest, to_json
+from mcstudy.execution.results import ResultsFolder, check_failures, digest, to_json
 
 ROOT = Path(__file__).parents[2]
 
@@ -223,7 +223,7 @@ def test_digest_changes_with_names_and_with_the_number_of_runs() -> None:
 
 HOLD = """
 import sys
-from mcstudy.results import ResultsFolder
+from mcstudy.execution.results import ResultsFolder
 with ResultsFolder(sys.argv[1]).open_for_writing():
     print("held", flush=True)
     sys.stdin.read()

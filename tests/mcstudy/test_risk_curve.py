@@ -10,13 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from mcstudy.execution.results import to_json
 from mcstudy.figures import risk, style
 from mcstudy.injury import risk_curve
 from mcstudy.injury.observations import Observations, observe
 from mcstudy.injury.risk_curve import INFLUENCE_SHOWN, describe_risk
 from mcstudy.injury.survival import FAMILIES, QUALITY_AT, fit_risk_curve, quality_class
 from mcstudy.injury.turnbull import estimate_steps
-from mcstudy.results import to_json
 
 Array = NDArray[np.float64]
 

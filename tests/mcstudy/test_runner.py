@@ -11,10 +11,11 @@ import pytest
 import toy_evaluation
 from numpy.typing import NDArray
 
-from mcstudy import designs, runner
 from mcstudy.errors import StudyError
-from mcstudy.progress import Progress
-from mcstudy.results import ResultsFolder, digest
+from mcstudy.execution import runner
+from mcstudy.execution.progress import Progress
+from mcstudy.execution.results import ResultsFolder, digest
+from mcstudy.sampling import designs
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 from scipy import special
 
-from mcstudy.sensitivity.factors import DUMMY, NUDGE, factors_of, nudged
-from mcstudy.sensitivity.saltelli import SCRAMBLES, Saltelli, block_size, draw_saltelli
+from mcstudy.sampling.factors import DUMMY, NUDGE, factors_of, nudged
+from mcstudy.sampling.saltelli import SCRAMBLES, Saltelli, block_size, draw_saltelli
 from mcstudy.sensitivity.sobol import Indices, estimate_indices, split_blocks
 
 Array = NDArray[np.float64]

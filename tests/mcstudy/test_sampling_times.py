@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mcstudy.sampling_times import regular_times
+from mcstudy.measurement.sampling_times import regular_times
 
 QUIET = settings(derandomize=True, deadline=None, database=None, max_examples=60)
 

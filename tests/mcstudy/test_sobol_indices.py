@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from SALib.analyze import sobol as salib_sobol
 from scipy import special, stats
 
-from mcstudy.sensitivity.saltelli import Saltelli, draw_saltelli
+from mcstudy.sampling.saltelli import Saltelli, draw_saltelli
 from mcstudy.sensitivity.sobol import Blocks, Indices, estimate_indices, split_blocks
 
 Array = NDArray[np.float64]

@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-from mcstudy import designs, statistics
+from mcstudy import statistics
+from mcstudy.sampling import designs
 from mcstudy.statistics import Estimate
 
 Array = NDArray[np.float64]

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from mcstudy import terminal
 from mcstudy.errors import UserError
+from studies import terminal
 
 HOSTILE = "[bold]a[/bold] :smile: * ** [link=x]y[/] \\[z]"
 
@@ -44,7 +44,7 @@ def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[byte
     """Run the command line with another encoding of its output."""
     kept = {key: value for key, value in os.environ.items() if not key.startswith(("LC_", "LANG"))}
     return subprocess.run(
-        [sys.executable, "-c", "from mcstudy.cli import main; main()", *arguments],
+        [sys.executable, "-c", "from studies.cli import main; main()", *arguments],
         env=kept | environment, capture_output=True, timeout=120, check=False,
     )  # fmt: skip
 

@@ -89,7 +89,7 @@ def test_wrong_options_are_refused_in_one_line(options: dict[str, Any], message:
 
 @pytest.mark.parametrize("corridor", [5.0, ""])
 def test_a_corridor_that_is_no_name_is_refused(corridor: Any) -> None:
-    # A study file may give any option as a number (mcstudy.config.ModelChoice).
+    # A study file may give any option as a number (mcstudy.studyfile.config.ModelChoice).
     with pytest.raises((ValueError, TypeError)):
         load_model("headform", {"corridor": corridor})
 

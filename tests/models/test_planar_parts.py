@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from models.contact.road import Road
 from models.crash.ellipsoids import Ellipsoids, build_ellipsoids
-from models.crash.road import Road
 from models.multibody.joints import apply_joint_torques
 from models.multibody.kinematics import update_kinematics
 from models.multibody.setup import build_tree, place

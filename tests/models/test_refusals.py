@@ -10,12 +10,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from mcstudy import cli
-from mcstudy.results import ResultsFolder
+from mcstudy.execution.results import ResultsFolder
 from models.multibody.model import MultibodyModel
 from models.pedestrian.anthropometry import build_body, is_possible
 from models.protocol import Input, Model
 from models.registry import load_model, model_names
+from studies import cli
 
 QUIET = settings(derandomize=True, deadline=None, database=None, max_examples=80)
 MODELS = {name: load_model(name) for name in model_names()}

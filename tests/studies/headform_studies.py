@@ -21,13 +21,13 @@ import pytest
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from mcstudy import cli
-from mcstudy.config import parse_study
+from mcstudy.execution.results import ResultsFolder
 from mcstudy.figures import style
 from mcstudy.report import document
-from mcstudy.results import ResultsFolder
+from mcstudy.studyfile.config import parse_study
 from models.registry import load_model
-from studies import evaluation
+from studies import cli
+from studies import worker as evaluation
 from studies.api import PIPELINES
 from studies.monte_carlo import study as monte_carlo
 from studies.morris import study as morris

@@ -20,7 +20,7 @@ SMALL = (
 
 def mcstudy(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "mcstudy.cli", *map(str, arguments)],
+        [sys.executable, "-m", "studies.cli", *map(str, arguments)],
         capture_output=True,
         text=True,
         timeout=300,
@@ -71,7 +71,7 @@ def test_modules_of_the_users_own_in_the_working_folder_are_not_imported(tmp_pat
 def test_an_interrupt_is_told_and_the_same_command_resumes(tmp_path: Path) -> None:
     study, out = tmp_path / "small.toml", tmp_path / "out"
     study.write_text(SMALL.replace("n = 12", "n = 400"))
-    command = [sys.executable, "-m", "mcstudy.cli", "run", study, "--out", out, "--workers", "2"]
+    command = [sys.executable, "-m", "studies.cli", "run", study, "--out", out, "--workers", "2"]
     # Started with the default handler: a shell's background jobs ignore the signal.
     process = subprocess.Popen(
         command,

@@ -23,11 +23,12 @@ from matplotlib.legend import Legend
 from numpy.typing import NDArray
 
 from mcstudy.errors import StudyError
+from mcstudy.execution.results import ResultsFolder
 from mcstudy.figures import style
 from mcstudy.report import document
-from mcstudy.results import ResultsFolder
 from models.registry import load_model
-from studies import api, evaluation
+from studies import api
+from studies import worker as evaluation
 from studies.injury import speed as injury_speed
 from studies.injury import study as injury
 from studies.sobol import analysis as sobol_analysis

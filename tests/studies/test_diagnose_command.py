@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mcstudy.config import MonteCarloStudy, load_study
 from mcstudy.errors import UserError
-from mcstudy.results import ResultsFolder
+from mcstudy.execution.results import ResultsFolder
+from mcstudy.studyfile.config import MonteCarloStudy, load_study
 from studies.api import run_study
 from studies.diagnosis import words
 from studies.diagnosis.study import diagnose
@@ -135,7 +135,7 @@ def test_a_model_that_has_the_effect_is_adequate(gain: Any, tmp_path: Path) -> N
 
 def run_command(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "mcstudy.cli", "diagnose", *arguments],
+        [sys.executable, "-m", "studies.cli", "diagnose", *arguments],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
 

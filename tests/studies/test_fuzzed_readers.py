@@ -28,22 +28,22 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
-from mcstudy import cli
-from mcstudy.config import load_study
 from mcstudy.errors import UserError
+from mcstudy.execution.results import ResultsFolder, digest
 from mcstudy.figures import risk
 from mcstudy.files import read_study_text
 from mcstudy.injury import association
 from mcstudy.injury.survival import RiskFit
-from mcstudy.isomme import read_test, write_test
-from mcstudy.measured import load_measured
-from mcstudy.results import ResultsFolder, digest
+from mcstudy.measurement.isomme import read_test, write_test
+from mcstudy.measurement.measured_data import load_measured
+from mcstudy.studyfile.config import load_study
 from models.contact.corridor import build_corridor, corridor_text, load_corridors
 from models.contact.law import ForceCurve
 from models.registry import load_model
-from studies import cells, stiffness
+from studies import cli, stiffness
+from studies import paired_runs as cells
 from studies.diagnosis import study as diagnosis
-from studies.exchange import write_isomme
+from studies.isomme_export import write_isomme
 from studies.monte_carlo import study as monte_carlo
 from studies.morris import study as morris
 from studies.sobol import study as sobol

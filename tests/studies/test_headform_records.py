@@ -8,8 +8,8 @@ import pytest
 from headform_studies import mcstudy
 from numpy.typing import NDArray
 
-from mcstudy.measured import load_measured
-from mcstudy.results import ResultsFolder
+from mcstudy.execution.results import ResultsFolder
+from mcstudy.measurement.measured_data import load_measured
 from studies.diagnosis.model_choice import choose_model
 from studies.diagnosis.problem import build_problem
 from studies.diagnosis.study import simulation_of

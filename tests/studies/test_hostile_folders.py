@@ -18,8 +18,7 @@ from headform_studies import without_figures
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mcstudy import cli
-from studies import api
+from studies import api, cli
 
 QUIET = settings(
     derandomize=True, deadline=None, database=None, max_examples=25,

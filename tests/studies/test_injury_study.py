@@ -19,15 +19,16 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.special import expit, ndtr
 
-from mcstudy import config
-from mcstudy.config import InjuryStudy, parse_study
 from mcstudy.errors import StudyError, UserError
+from mcstudy.execution.results import ResultsFolder
 from mcstudy.injury import association
 from mcstudy.injury.functions import RiskFunction
-from mcstudy.results import ResultsFolder
+from mcstudy.studyfile import config
+from mcstudy.studyfile.config import InjuryStudy, parse_study
 from models.headform.model import HeadformModel
 from models.registry import load_model
-from studies import api, evaluation
+from studies import api
+from studies import worker as evaluation
 from studies.execution import load_study_model
 from studies.injury import analysis as injury_analysis
 from studies.injury import report as injury_report

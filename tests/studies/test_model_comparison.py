@@ -10,12 +10,12 @@ import pandas as pd
 import pytest
 from headform_studies import INPUTS, without_figures
 
-from mcstudy import cli
-from mcstudy.config import ModelComparison, load_study, parse_study
 from mcstudy.errors import StudyError, UserError
-from mcstudy.results import ResultsFolder, digest
+from mcstudy.execution.results import ResultsFolder, digest
+from mcstudy.studyfile.config import ModelComparison, load_study, parse_study
 from models.registry import load_model
-from studies import api, catalogue
+from studies import api, cli
+from studies import listing as catalogue
 from studies.model_comparison.study import NOMINAL, build_report
 
 FACTOR = 2.0**0.75

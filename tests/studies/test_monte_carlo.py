@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mcstudy.config import MonteCarloStudy, parse_study
 from mcstudy.errors import StudyError, UserError
-from mcstudy.results import ResultsFolder, digest
+from mcstudy.execution.results import ResultsFolder, digest
+from mcstudy.studyfile.config import MonteCarloStudy, parse_study
 from models.registry import load_model
 from studies.api import rerun
 from studies.monte_carlo.study import build_report, run_monte_carlo

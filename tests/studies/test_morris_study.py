@@ -23,7 +23,7 @@ from headform_studies import (
 from scipy import special
 
 from mcstudy.errors import StudyError, UserError
-from mcstudy.results import ResultsFolder, digest
+from mcstudy.execution.results import ResultsFolder, digest
 from studies import api
 from studies.morris import report as morris_report
 

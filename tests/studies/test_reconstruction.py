@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from mcstudy.config import Reconstruction, load_study, parse_study
 from mcstudy.errors import UserError
-from mcstudy.isomme import read_test
-from mcstudy.results import ResultsFolder
+from mcstudy.execution.results import ResultsFolder
+from mcstudy.measurement.isomme import read_test
+from mcstudy.studyfile.config import Reconstruction, load_study, parse_study
 from models.criteria import head_injury_criterion
 from studies.reconstruction import reconstruct, write_reconstruction
 

@@ -16,12 +16,12 @@ from headform_studies import Answer, contents, mcstudy
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from mcstudy.execution.results import ResultsFolder
 from mcstudy.figures import risk, style
 from mcstudy.injury import risk_curve as describing
 from mcstudy.injury.observations import Observations, observe
 from mcstudy.injury.survival import FAMILIES, RiskFit, fit_risk_curve, quality_class
 from mcstudy.report import document
-from mcstudy.results import ResultsFolder
 from studies.api import run_study
 from studies.injury import study as injury
 

@@ -27,7 +27,7 @@ from headform_studies import (
 )
 
 from mcstudy.errors import UserError
-from mcstudy.results import ResultsFolder
+from mcstudy.execution.results import ResultsFolder
 from mcstudy.sensitivity import delta, given_data
 from studies.sensitivity import report as sensitivity_report
 from studies.sensitivity.measure import measure_sensitivity

@@ -33,7 +33,7 @@ from headform_studies import (
 )
 
 from mcstudy.errors import StudyError, UserError
-from mcstudy.results import ResultsFolder, digest
+from mcstudy.execution.results import ResultsFolder, digest
 from models.registry import load_model
 from studies import api
 from studies.failure_report import failure_map

@@ -11,16 +11,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mcstudy import cli
-from mcstudy.config import MonteCarloStudy, hash_of, load_study, numbers_digest
 from mcstudy.errors import UserError
-from mcstudy.isomme import write_test
-from mcstudy.measured import load_measured
-from mcstudy.results import ResultsFolder
+from mcstudy.execution.results import ResultsFolder
+from mcstudy.measurement.isomme import write_test
+from mcstudy.measurement.measured_data import load_measured
+from mcstudy.studyfile.config import MonteCarloStudy, hash_of, load_study, numbers_digest
 from models.contact.corridor import load_corridors
 from models.protocol import OK
 from models.registry import load_model
-from studies import example_tests
+from scripts import example_tests
+from studies import cli
 from studies.api import rerun, run_case, run_study
 from studies.execution import load_study_model
 from studies.stiffness import fit_stiffness_of
@@ -75,7 +75,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, An
     out = tmp_path_factory.mktemp("fit") / "out"
     arguments = ["fit-stiffness", str(EXAMPLE), "--out", str(out), "--json"]
     done = subprocess.run(
-        [sys.executable, "-m", "mcstudy.cli", *arguments],
+        [sys.executable, "-m", "studies.cli", *arguments],
         capture_output=True, text=True, timeout=300,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

@@ -15,13 +15,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mcstudy import cli
 from mcstudy.errors import StudyError, UserError
+from mcstudy.execution.results import ResultsFolder
 from mcstudy.figures.panels import Curve, Panel, draw_panels
-from mcstudy.results import ResultsFolder
 from models.component.neck_pendulum import swing_neck
 from models.pedestrian.anthropometry import build_body
 from models.pedestrian.joints import build_joints
+from studies import cli
 from studies.validation import (
     dummy_head,
     head_impact,
@@ -348,7 +348,7 @@ def test_json_of_three_parts(tmp_path: Path) -> None:
     names = ["standing-child", "body-parts", "headform"]
     only = [word for name in names for word in ("--only", name)]
     done = subprocess.run(
-        [sys.executable, "-m", "mcstudy.cli", "validate", *only, "--json", "--out", tmp_path / "v"],
+        [sys.executable, "-m", "studies.cli", "validate", *only, "--json", "--out", tmp_path / "v"],
         capture_output=True, text=True, timeout=300,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr

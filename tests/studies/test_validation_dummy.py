@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mcstudy import cli
+from studies import cli
 from studies.validation import dummy_head
 from studies.validation.check import Part
 

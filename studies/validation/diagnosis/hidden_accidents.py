@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mcstudy import config
-from mcstudy.config import MonteCarloStudy, load_study
+from mcstudy.studyfile import config
+from mcstudy.studyfile.config import MonteCarloStudy, load_study
 from models.registry import load_model
 from studies.validation.diagnosis.hidden_effects import Hidden
 

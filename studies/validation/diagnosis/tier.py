@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, delayed
 
+from mcstudy.execution.progress import follow
+from mcstudy.execution.results import ResultsFolder
 from mcstudy.figures.panels import Curve, Panel, draw_panels
-from mcstudy.progress import follow
 from mcstudy.report import Section, Table
-from mcstudy.results import ResultsFolder
 from mcstudy.statistics import probability
 from mcstudy.text import number, percent
 from studies.execution import publish

@@ -18,8 +18,8 @@ from mcstudy.diagnosis.naming import rescale
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.diagnosis.screening import POWER
 from mcstudy.diagnosis.search import UNEXPLAINED, Finding, fit_base, search
-from mcstudy.measured import load_measured
-from studies.diagnosis.catalogue import causes_of
+from mcstudy.measurement.measured_data import load_measured
+from studies.diagnosis.causes import causes_of
 from studies.diagnosis.model_choice import choose_model
 from studies.diagnosis.problem import build_problem
 from studies.diagnosis.study import simulation_of

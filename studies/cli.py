@@ -13,7 +13,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from mcstudy.errors import StudyError, UserError, on_one_line
-from mcstudy.terminal import accept_any_text, print_lines, print_path, print_table
+from studies.terminal import accept_any_text, print_lines, print_path, print_table
 
 app = typer.Typer(
     help="Monte Carlo uncertainty and injury-risk studies of crash simulations.",
@@ -95,7 +95,7 @@ def reconstruct(study: Study, out: Out = None, quiet: Quiet = False, as_json: Js
 @app.command()
 def report(folder: Folder, quiet: Quiet = False, as_json: Json = False) -> None:
     """Rebuild analysis, figures and report of a results folder without running the model."""
-    from mcstudy.results import ResultsFolder
+    from mcstudy.execution.results import ResultsFolder
     from studies import api
 
     results = ResultsFolder(folder)
@@ -117,7 +117,7 @@ def sensitivity(
     as_json: Json = False,
 ) -> None:
     """Measure what drives the outputs of any results folder, whatever its design was."""
-    from mcstudy.results import ResultsFolder
+    from mcstudy.execution.results import ResultsFolder
     from studies.sensitivity import measure as sensitivity
     from studies.sensitivity import report as sensitivity_report
 
@@ -145,7 +145,7 @@ def fit_stiffness(
     as_json: Json = False,
 ) -> None:
     """Fit force-penetration curves to headform tests and build their stiffness corridor."""
-    from mcstudy.results import ResultsFolder
+    from mcstudy.execution.results import ResultsFolder
     from studies import stiffness
 
     folder = ResultsFolder(out or Path("results") / f"stiffness_{data.resolve().name}")
@@ -175,8 +175,8 @@ def risk_curve(
     as_json: Json = False,
 ) -> None:
     """Fit injury-risk curves to censored cases, as ISO/TS 18506 does."""
-    from mcstudy.results import ResultsFolder
-    from studies import risk_curve
+    from mcstudy.execution.results import ResultsFolder
+    from studies.risk_curve import study as risk_curve
 
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", f"risk_{cases.resolve().stem}_{stimulus}")
     folder = ResultsFolder(out or Path("results") / name)
@@ -202,7 +202,7 @@ def diagnose(
     as_json: Json = False,
 ) -> None:
     """Tell what a simulation gets wrong against measured tests, why, and what a cure gains."""
-    from mcstudy.results import ResultsFolder
+    from mcstudy.execution.results import ResultsFolder
     from studies.diagnosis import report as diagnosis_report
     from studies.diagnosis import study as diagnosis
 
@@ -234,7 +234,7 @@ def validate(
 
     With --diagnosis: hide effects in data, diagnose them, and print how often the truth was found.
     """
-    from mcstudy.results import ResultsFolder
+    from mcstudy.execution.results import ResultsFolder
     from studies.validation import report
     from studies.validation.diagnosis import tier
 
@@ -258,7 +258,7 @@ def validate(
 @app.command()
 def status(folder: Folder, as_json: Json = False) -> None:
     """Tell how far the study of a results folder is."""
-    from mcstudy.results import ResultsFolder
+    from mcstudy.execution.results import ResultsFolder
 
     results = ResultsFolder(folder)
     manifest, total = results.read_json("manifest.json"), results.design()["n"]
@@ -279,7 +279,7 @@ def models(
     as_json: Json = False,
 ) -> None:
     """List the models, or the inputs and outputs of one."""
-    from studies import catalogue
+    from studies import listing as catalogue
 
     if name is None:
         if as_json:
@@ -307,7 +307,7 @@ def effects(
     as_json: Json = False,
 ) -> None:
     """List the effects that a model can be extended with, or describe one."""
-    from studies import catalogue
+    from studies import listing as catalogue
 
     if as_json:
         _print_json(
@@ -353,7 +353,7 @@ def _print_analysis(
 
 
 def _print_json(content: dict[str, Any]) -> None:
-    from mcstudy.results import to_json
+    from mcstudy.execution.results import to_json
 
     sys.stdout.write(to_json(content))
 

@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mcstudy.config import InjuryStudy, ModelComparison, MonteCarloStudy
 from mcstudy.errors import StudyError, UserError
-from mcstudy.progress import say
-from mcstudy.results import ResultsFolder, digest
-from mcstudy.workers import Workers
+from mcstudy.execution.progress import say
+from mcstudy.execution.results import ResultsFolder, digest
+from mcstudy.execution.workers import Workers
+from mcstudy.studyfile.config import InjuryStudy, ModelComparison, MonteCarloStudy
 from models.protocol import Model
 from studies.execution import columns_of, run_rows
 

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mcstudy.chunk import CRASHED, NOT_FINITE, TIMEOUT, UNPHYSICAL
+from mcstudy.execution.chunk import CRASHED, NOT_FINITE, TIMEOUT, UNPHYSICAL
 
 Flags = NDArray[np.bool_]
 

@@ -3,7 +3,7 @@
 import shutil
 from pathlib import Path
 
-from mcstudy.results import ResultsFolder
+from mcstudy.execution.results import ResultsFolder
 from studies.api import run_case, run_study
 from studies.stiffness import fit_stiffness_of
 from studies.validation.report import validate

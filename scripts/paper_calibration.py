@@ -10,7 +10,7 @@ random search and Nelder-Mead. A tumbling body is partly chaotic, so the refinem
 mean over jittered copies of the inputs and not one lucky run. Everything else that the model gives
 is prediction.
 
-Run as ``python -m studies.paper_calibration``; it prints the values and changes no file.
+Run as ``python -m scripts.paper_calibration``; it prints the values and changes no file.
 """
 
 import argparse

@@ -14,7 +14,7 @@ import numpy as np
 
 from mcstudy import units
 from mcstudy.errors import UserError
-from mcstudy.isomme.files import FILTERS, RAW, SOUND, Channel, ChannelFile, Test
+from mcstudy.measurement.isomme.files import FILTERS, RAW, SOUND, Channel, ChannelFile, Test
 
 AXES = "XYZ"
 RESULTANT = "R"

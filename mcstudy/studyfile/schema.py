@@ -13,10 +13,10 @@ from pydantic import (
     model_validator,
 )
 
-from mcstudy import designs
-from mcstudy.inputs import Distribution, Unit
+from mcstudy.sampling import designs
+from mcstudy.sampling.factors import DUMMY
 from mcstudy.sensitivity.blocks import FEWEST_BLOCKS
-from mcstudy.sensitivity.factors import DUMMY
+from mcstudy.studyfile.distributions import Distribution, Unit
 
 LARGEST_DESIGN = 10_000_000
 """Runs that one study may have; their table fits a machine's memory."""

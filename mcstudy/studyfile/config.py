@@ -10,15 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, ValidationError
 
-from mcstudy import designs, units
+from mcstudy import units
 from mcstudy.errors import UserError, on_one_line
 from mcstudy.files import parse_toml, read_study_text
-from mcstudy.inputs import (
+from mcstudy.sampling import designs
+from mcstudy.simulator import Simulator
+from mcstudy.studyfile.distributions import (
     copula_factor,
     sample_values,
     sampling_order,
 )
-from mcstudy.schema import (
+from mcstudy.studyfile.schema import (
     CommonStudy,
     ComparisonRow,
     ComparisonTable,
@@ -32,7 +34,6 @@ from mcstudy.schema import (
     SobolStudy,
     Study,
 )
-from mcstudy.simulator import Simulator
 
 __all__ = [
     "CommonStudy",

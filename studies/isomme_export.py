@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mcstudy import isomme
+from mcstudy.measurement import isomme
 from models.protocol import Run
 
 FEWEST = 8

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy import seeds
-from mcstudy.sensitivity.factors import factors_of, nudged, salib_problem
+from mcstudy.sampling import seeds
+from mcstudy.sampling.factors import factors_of, nudged, salib_problem
 
 Array = NDArray[np.float64]
 

@@ -24,7 +24,8 @@ from joblib.externals.loky import ProcessPoolExecutor, get_reusable_executor
 from joblib.parallel import get_active_backend
 from numpy.typing import NDArray
 
-from mcstudy.chunk import (
+from mcstudy.errors import StudyError
+from mcstudy.execution.chunk import (
     CRASHED,
     TIMEOUT,
     ChunkResult,
@@ -33,9 +34,8 @@ from mcstudy.chunk import (
     evaluate_chunk,
     read_traces,
 )
-from mcstudy.errors import StudyError
-from mcstudy.progress import Progress
-from mcstudy.results import ResultsFolder
+from mcstudy.execution.progress import Progress
+from mcstudy.execution.results import ResultsFolder
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]

@@ -7,21 +7,18 @@ from typing import Any
 import pandas as pd
 
 from mcstudy import units
-from mcstudy.config import InjuryStudy, load_study
 from mcstudy.errors import UserError
+from mcstudy.execution.results import ResultsFolder
 from mcstudy.figures import risk, style
 from mcstudy.injury.cases import observations_of, read_cases, read_parquet
 from mcstudy.injury.risk_curve import INFLUENTIAL, describe_risk
 from mcstudy.report import Section, Table
-from mcstudy.results import ResultsFolder
-from mcstudy.schema import REFERENCE
+from mcstudy.studyfile.config import InjuryStudy, load_study
+from mcstudy.studyfile.schema import REFERENCE
 from mcstudy.text import interval, number, unit
 from studies.execution import load_study_model, publish
-from studies.injury.analysis import proportional
+from studies.injury.analysis import CASES, proportional
 from studies.injury.cells import fronts_of
-
-CASES = "cases.parquet"
-"""What an injury study leaves for this in its folder."""
 
 
 def fit_risk_curves(

@@ -22,7 +22,7 @@ def at_work(workers: Workers) -> Iterator[None]:
     """
     if isinstance(workers, str):
         # Half a second of imports that only a study on a cluster needs.
-        from mcstudy.cluster import on_cluster
+        from mcstudy.execution.cluster import on_cluster
 
         with on_cluster(workers):
             yield

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcstudy.errors import UserError
-from mcstudy.isomme.files import MISSING
+from mcstudy.measurement.isomme.files import MISSING
 
 Array = NDArray[np.float64]
 

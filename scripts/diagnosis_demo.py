@@ -11,21 +11,21 @@ from typing import Any
 
 import numpy as np
 
-from mcstudy.config import InjuryStudy, parse_study
+from mcstudy.execution.progress import say
+from mcstudy.execution.results import ResultsFolder
 from mcstudy.figures import diagnosis as figures_of
 from mcstudy.figures import risk, style
 from mcstudy.files import read_study_text
 from mcstudy.injury.cases import read_parquet
-from mcstudy.progress import say
 from mcstudy.report import Section, Table
-from mcstudy.results import ResultsFolder
+from mcstudy.studyfile.config import InjuryStudy, parse_study
 from mcstudy.text import percent
 from studies.diagnosis import extension, words
 from studies.diagnosis.report import summarise
 from studies.diagnosis.study import diagnose
 from studies.execution import publish
+from studies.injury.analysis import CASES
 from studies.injury.study import run_injury
-from studies.risk_curve import CASES
 from studies.validation.diagnosis.hidden_effects import Hidden, make_tests
 
 INJURY_STUDY = Path("configs/demo_injury.toml")

@@ -22,12 +22,13 @@ import pandas as pd
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
-from mcstudy import isomme, units
-from mcstudy.config import first_problem
+from mcstudy import units
 from mcstudy.errors import UserError
 from mcstudy.files import parse_toml, read_study_text
-from mcstudy.inputs import Distribution, Unit
-from mcstudy.sampling_times import regular_times
+from mcstudy.measurement import isomme
+from mcstudy.measurement.sampling_times import regular_times
+from mcstudy.studyfile.config import first_problem
+from mcstudy.studyfile.distributions import Distribution, Unit
 from mcstudy.tables import TextTable, read_csv
 
 Array = NDArray[np.float64]
@@ -145,7 +146,8 @@ def load_measured(folder: Path | str, channels: Sequence[str] = ()) -> Measured:
     Parameters
     ----------
     folder : of the data.
-    channels : of ISO-MME tests, which to take; see ``mcstudy.isomme.head_acceleration``.
+    channels : of ISO-MME tests, which to take; see
+        ``mcstudy.measurement.isomme.head_acceleration``.
 
     Raises
     ------

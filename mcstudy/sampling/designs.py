@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from mcstudy import seeds
+from mcstudy.sampling import seeds
 
 Array = NDArray[np.float64]
 

@@ -1,6 +1,6 @@
 """Make the example of measured data in ``configs/hood_tests``: six simulated headform tests.
 
-Run as ``python -m studies.example_tests``. The curves are drawn from a corridor and hidden in
+Run as ``python -m scripts.example_tests``. The curves are drawn from a corridor and hidden in
 signals with noise, offset and lead-in, so that `mcstudy fit-stiffness` has something to find.
 """
 
@@ -17,7 +17,7 @@ SPEEDS = (8.33, 8.33, 8.33, 9.72, 9.72, 11.11)
 NOISE, OFFSET, SPEED_SD = 1.0, 0.4, 0.03
 
 HEADER = f"""# Six headform tests on one hood, SIMULATED with mcstudy's own headform model
-# (python -m studies.example_tests); an example of the measured-data format.
+# (python -m scripts.example_tests); an example of the measured-data format.
 
 format = "mcstudy-measured/1"
 title = "Example hood, child headform, 6 simulated tests"

@@ -1,0 +1,1 @@
+"""How runs are done, watched and kept."""

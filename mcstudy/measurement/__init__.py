@@ -1,0 +1,1 @@
+"""Measurements: folders of measured data and ISO-MME tests."""

@@ -1,0 +1,1 @@
+"""Where in the unit cube a study samples."""

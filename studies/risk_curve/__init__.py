@@ -1,0 +1,1 @@
+"""Injury-risk curves fitted to censored cases."""

@@ -1,26 +1,58 @@
 """Numba settings shared by every compiled kernel.
 
 Numba's own disk cache notices a change in the file of the compiled function only, not in the
-kernels that it calls. The cache folder is therefore named after a digest of all sources of this
-package: any edit gives a fresh cache, an unchanged installation never recompiles.
+kernels that it calls, and compiles again when a line above the function moves. The cache folder is
+therefore named after a digest of the code of this package, without comments, docstrings and places
+of lines: an edit of the code gives a fresh cache, nothing else does.
 """
 
+import ast
+import contextlib
 import hashlib
 import os
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core.caching import IndexDataCacheFile
 
 
-def _source_digest() -> str:
+def _without_docstrings(tree: ast.AST) -> ast.AST:
+    """Return a tree whose docstrings, its own and those in it, are gone."""
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            continue
+        first = node.body[0] if node.body else None
+        if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
+            node.body = node.body[1:]
+    return tree
+
+
+def digest_of(sources: Sequence[bytes]) -> str:
+    """Return a digest of the code of Python sources: what is no code does not change it."""
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(source.read_bytes())
+    for source in sources:
+        digest.update(ast.dump(_without_docstrings(ast.parse(source))).encode())
     return digest.hexdigest()[:16]
+
+
+def _package_digest(base: Path) -> str:
+    """Return the digest of this package's code, kept below ``base`` by that of its bytes."""
+    sources = [path.read_bytes() for path in sorted(Path(__file__).parent.rglob("*.py"))]
+    whole = hashlib.sha256(numba.__version__.encode() + b"".join(sources)).hexdigest()[:16]
+    kept = base / "mcstudy" / "sources" / whole
+    with contextlib.suppress(OSError):
+        return kept.read_text()
+    found = digest_of(sources)
+    if _usable(kept.parent):
+        # A process that reads it meanwhile sees nothing or all of it.
+        with tempfile.NamedTemporaryFile("w", dir=kept.parent, delete=False) as file:
+            file.write(found)
+        Path(file.name).replace(kept)
+    return found
 
 
 def _usable(folder: Path) -> bool:
@@ -35,21 +67,23 @@ def _usable(folder: Path) -> bool:
         return False
 
 
+def _user_cache() -> Path | None:
+    """Return the user's cache folder, None if there is neither HOME nor an entry among users."""
+    try:
+        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    except RuntimeError:
+        return None
+
+
 def _cache_folder() -> Path | None:
     """Return the folder of compiled kernels: in the user's cache, else in the temporary folder.
 
     None if neither can be written: the kernels are compiled anew in every process then.
     """
-    name = f"kernels-{_source_digest()}"
-    try:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    except RuntimeError:
-        # Neither HOME nor an entry among the users, as in containers.
-        wanted = None
-    else:
-        wanted = base / "mcstudy" / name
-        if _usable(wanted):
-            return wanted
+    name = f"kernels-{_DIGEST}"
+    wanted = None if _BASE is None else _BASE / "mcstudy" / name
+    if wanted is not None and _usable(wanted):
+        return wanted
     user = os.getuid() if hasattr(os, "getuid") else "user"
     why = "there is no home folder" if wanted is None else f"{wanted} cannot be written"
     try:
@@ -63,6 +97,8 @@ def _cache_folder() -> Path | None:
     return None
 
 
+_BASE = _user_cache()
+_DIGEST = _package_digest(_BASE or Path(tempfile.gettempdir()))
 _CACHED = True
 if "NUMBA_CACHE_DIR" not in os.environ:
     _folder = _cache_folder()
@@ -82,8 +118,13 @@ def _compile(function: Callable[..., Any], inline: bool) -> Callable[..., Any]:
         "forceinline": inline,
         "_nrt": False,
     }
-    compiled: Callable[..., Any] = numba.njit(**flags)(function)
-    return compiled
+    compiled: Any = numba.njit(**flags)(function)
+    if _CACHED:
+        # Neither the file's date nor the line of the function counts, but the code.
+        place = f"{function.__module__}.{function.__qualname__}"
+        file: Callable[..., Any] = IndexDataCacheFile
+        compiled._cache._cache_file = file(compiled._cache.cache_path, place, _DIGEST)
+    return compiled  # type: ignore[no-any-return]
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:

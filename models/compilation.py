@@ -110,11 +110,13 @@ if "NUMBA_CACHE_DIR" not in os.environ:
             os.environ["NUMBA_CACHE_DIR"] = str(_folder)
 
 
-def _compile(function: Callable[..., Any], inline: bool) -> Callable[..., Any]:
+def _compile(
+    function: Callable[..., Any], *, inline: bool = False, fuse: bool = True
+) -> Callable[..., Any]:
     flags: dict[str, Any] = {
         "cache": _CACHED,
         "error_model": "numpy",
-        "fastmath": {"contract"},
+        "fastmath": {"contract"} if fuse else False,
         "forceinline": inline,
         "_nrt": False,
     }
@@ -135,7 +137,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     product and a sum is allowed: it is decided when the code is compiled, so a batch row gives the
     same bits in every process.
     """
-    return _compile(function, inline=False)
+    return _compile(function)
 
 
 def inlined_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -145,3 +147,8 @@ def inlined_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     copies some hundred words.
     """
     return _compile(function, inline=True)
+
+
+def unfused_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile like ``kernel`` with every product rounded: the bits of the same NumPy expression."""
+    return _compile(function, fuse=False)

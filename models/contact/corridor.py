@@ -3,6 +3,7 @@
 A corridor coordinate from 0 (lower) over 0.5 (median) to 1 (upper) picks a curve between them.
 """
 
+import functools
 import json
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -62,10 +63,20 @@ class Corridor:
         if not 0.0 <= coordinate <= 1.0:
             raise ValueError(f"a corridor coordinate lies within 0 and 1, given {coordinate}")
         share = abs(2.0 * coordinate - 1.0)
-        bound = self.lower if coordinate < 0.5 else self.upper
-        knots = np.union1d(self.median.penetration, bound.penetration)
-        force = (1.0 - share) * self.median.at(knots) + share * bound.at(knots)
+        below, above = self._halves
+        knots, median, bound = below if coordinate < 0.5 else above
+        force = (1.0 - share) * median + share * bound
         return ForceCurve(knots, force, self.median.unloading_ratio, self.median.damping)
+
+    @functools.cached_property
+    def _halves(self) -> tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]]:
+        """Knots (m) of the lower and the upper half, with the median's and the bound's forces."""
+
+        def half(bound: ForceCurve) -> tuple[Array, Array, Array]:
+            knots = np.union1d(self.median.penetration, bound.penetration)
+            return knots, self.median.at(knots), bound.at(knots)
+
+        return half(self.lower), half(self.upper)
 
 
 def read_corridor(row: Mapping[str, Any]) -> Corridor:

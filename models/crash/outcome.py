@@ -15,8 +15,6 @@ from models.crash.record import (
     R_HEAD_CAR,
     R_HEAD_ROAD,
     R_RELATIVE,
-    R_SPIN,
-    R_SPIN_RATE,
     R_TIME,
     R_ZONES,
     S_ENERGY_END,
@@ -36,6 +34,8 @@ from models.criteria import (
     head_injury_criterion,
     impact_angle,
 )
+from models.criteria.hic import cumulative_area, maximise_window
+from models.criteria.sampling import resultant, sample_record
 from models.criteria.units import STANDARD_GRAVITY
 from models.effects.chain import EffectChain
 from models.effects.reading import Reading, record_reading
@@ -109,34 +109,31 @@ class Signals:
 
     def sampled(self, first: int, columns: int, time: Array | None = None) -> Array:
         """Return columns (n, columns) of the record on the grid, or at the given times."""
-        record = self._raw.record
         grid = self.time if time is None else time
-        return np.stack(
-            [np.interp(grid, record[:, R_TIME], record[:, first + k]) for k in range(columns)],
-            axis=1,
-        )
+        return sample_record(self._raw.record, first, columns, grid)
+
+    @functools.cached_property
+    def _motion(self) -> Array:
+        """Head acceleration, angular velocity and angular acceleration (n, 9) as recorded."""
+        return self.sampled(R_ACCELERATION, 9, self.head_time)
 
     @functools.cached_property
     def acceleration(self) -> Array:
         """Resultant acceleration (n,) in g."""
         raw = self._raw
-        felt = Reading(
-            self.sampled(R_ACCELERATION, 3, self.head_time) / STANDARD_GRAVITY, LINEAR_CLASS
-        )
+        felt = Reading(self._motion[:, :3] / STANDARD_GRAVITY, LINEAR_CLASS)
         read = record_reading(raw.chain, raw.values, felt, SAMPLING_RATE, origin=0)
-        return np.asarray(np.linalg.norm(read.acceleration, axis=1))
+        return resultant(read.acceleration)
 
     @functools.cached_property
     def spin(self) -> Array:
         """Angular velocity (n, 3) in rad/s, own axes."""
-        return filter_cfc(self.sampled(R_SPIN, 3, self.head_time), SAMPLING_RATE, ANGULAR_CLASS)
+        return filter_cfc(self._motion[:, 3:6], SAMPLING_RATE, ANGULAR_CLASS)
 
     @functools.cached_property
     def spin_rate(self) -> Array:
         """Angular acceleration (n, 3) in rad/s2, own axes."""
-        return filter_cfc(
-            self.sampled(R_SPIN_RATE, 3, self.head_time), SAMPLING_RATE, ANGULAR_CLASS
-        )
+        return filter_cfc(self._motion[:, 6:], SAMPLING_RATE, ANGULAR_CLASS)
 
 
 def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
@@ -146,8 +143,15 @@ def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
     road = slice(signals.split, time.size)
     landed = time[road].size > SHORTEST_PHASE
 
-    def hic(phase: slice, window: float) -> float:
-        return head_injury_criterion(time[phase], signals.acceleration[phase], window)[0]
+    @functools.cache
+    def area() -> Array:
+        return cumulative_area(time[car], signals.acceleration[car])
+
+    def hic(window: float) -> float:
+        return maximise_window(time[car], signals.acceleration[car], area(), window)[0]
+
+    def ground_hic() -> float:
+        return head_injury_criterion(time[road], signals.acceleration[road], 0.015)[0]
 
     def clip(mode: str) -> float:
         return clip_level(time[car], signals.acceleration[car], mode=mode)
@@ -166,21 +170,19 @@ def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
         return float((gained - raw.work.sum()) / np.abs(raw.work).max())
 
     return {
-        "hic15": lambda: hic(car, 0.015),
-        "hic36": lambda: hic(car, 0.036),
+        "hic15": lambda: hic(0.015),
+        "hic36": lambda: hic(0.036),
         "clip_3ms": lambda: clip("cumulative"),
         "clip_3ms_consecutive": lambda: clip("consecutive"),
         "peak_head_acceleration": lambda: float(signals.acceleration[car].max()),
-        "head_angular_velocity": lambda: float(np.linalg.norm(signals.spin[car], axis=1).max()),
-        "head_angular_acceleration": lambda: float(
-            np.linalg.norm(signals.spin_rate[car], axis=1).max()
-        ),
+        "head_angular_velocity": lambda: float(resultant(signals.spin[car]).max()),
+        "head_angular_acceleration": lambda: float(resultant(signals.spin_rate[car]).max()),
         "bric": lambda: brain_injury_criterion(signals.spin[car]),
         "throw_distance": throw,
         "launch_speed": lambda: float(
             (np.diff(record[:, R_CENTRE]) / np.diff(record[:, R_TIME])).max()
         ),
-        "ground_hic15": lambda: hic(road, 0.015) if landed else 0.0,
+        "ground_hic15": lambda: ground_hic() if landed else 0.0,
         "ground_time": ground_time,
         "crash_duration": lambda: float(raw.summary[S_TIME]),
         "car_stopping_distance": lambda: stopping_distance(raw.scenario.car_motion),
@@ -198,6 +200,7 @@ def _head_contact(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
     vehicle, laws = raw.scenario.vehicle, raw.scenario.ellipsoids
     law = int(laws.surface_law[HEAD, zone])
 
+    @functools.cache
     def wad() -> float:
         dive = raw.chain.act("inputs", raw.values, raw.values)["dive_angle"]
         surface = surface_point(raw.scenario.zones, zone, contact[[7, 9]])
@@ -241,12 +244,12 @@ def histories(
     zones, head = raw.scenario.vehicle.zones, signals.head_time
     head_channels: dict[str, tuple[str, Callable[[], Array]]] = {
         "acceleration": ("g", lambda: signals.acceleration),
-        "angular_velocity": ("rad/s", lambda: np.linalg.norm(signals.spin, axis=1)),
+        "angular_velocity": ("rad/s", lambda: resultant(signals.spin)),
         **{f"angular_velocity_{axis}": ("rad/s", spin(k)) for k, axis in enumerate("xyz")},
-        "angular_acceleration": ("rad/s2", lambda: np.linalg.norm(signals.spin_rate, axis=1)),
+        "angular_acceleration": ("rad/s2", lambda: resultant(signals.spin_rate)),
         "velocity_relative_to_car": (
             "m/s",
-            lambda: np.asarray(np.linalg.norm(signals.sampled(R_RELATIVE, 3, head), axis=1)),
+            lambda: resultant(signals.sampled(R_RELATIVE, 3, head)),
         ),
         **{
             f"velocity_relative_to_car_{axis}": ("m/s", column(R_RELATIVE + k, head))

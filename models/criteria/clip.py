@@ -12,10 +12,17 @@ from models.compilation import kernel
 
 
 @kernel
-def _time_above(t, a, level, consecutive):
-    """Total, or longest single, time in s with the signal at or above ``level``."""
+def _time_above(t, a, cells, count, level, consecutive):
+    """Total, or longest single, time in s with the signal at or above ``level``.
+
+    ``cells`` holds the samples at which the first ``count`` cells begin that come near the level.
+    """
     total, run, longest = 0.0, 0.0, 0.0
-    for i in range(t.size - 1):
+    for c in range(count):
+        i = cells[c]
+        # A cell that is left out lies below the level and ends a run.
+        if c > 0 and cells[c - 1] != i - 1:
+            run = 0.0
         a0, a1, dt = a[i] - level, a[i + 1] - level, t[i + 1] - t[i]
         if a0 >= 0.0 and a1 >= 0.0:
             part, broken_before, broken_after = dt, False, False
@@ -31,6 +38,31 @@ def _time_above(t, a, level, consecutive):
         if broken_after:
             run = 0.0
     return longest if consecutive else total
+
+
+@kernel
+def _highest_level(t, a, cells, duration, low, high, consecutive):
+    """Return the highest level held; ``cells`` is room for as many as there are."""
+    count = t.size - 1
+    for i in range(count):
+        cells[i] = i
+    # The held time falls with the level; bisect to the last bit of a double.
+    while True:
+        middle = 0.5 * (low + high)
+        if middle in (low, high):
+            return low
+        if _time_above(t, a, cells, count, middle, consecutive) >= duration:
+            low = middle
+            # What lies below this level counts for none above it.
+            kept = 0
+            for c in range(count):
+                i = cells[c]
+                if a[i] >= low or a[i + 1] >= low:
+                    cells[kept] = i
+                    kept += 1
+            count = kept
+        else:
+            high = middle
 
 
 def clip_level(
@@ -70,14 +102,6 @@ def clip_level(
         raise ValueError(f"mode must be 'cumulative' or 'consecutive', given {mode!r}")
     if t[-1] - t[0] < duration:
         return 0.0
-    consecutive = mode == "consecutive"
+    cells = np.empty(t.size - 1, dtype=np.int64)
     low, high = float(a.min()), float(a.max())
-    # The held time falls with the level; bisect to the last bit of a double.
-    while True:
-        middle = 0.5 * (low + high)
-        if middle in (low, high):
-            return low
-        if _time_above(t, a, middle, consecutive) >= duration:
-            low = middle
-        else:
-            high = middle
+    return float(_highest_level(t, a, cells, duration, low, high, mode == "consecutive"))

@@ -45,46 +45,57 @@ def _sections(frequency_class: float, sampling_rate: float) -> Array:
 
 @inlined_kernel
 def _pass(section, values, start, step):
-    """Filter values in place, from the state that a constant of the first value would leave.
+    """Filter three columns in place, from the state that a constant of their first would leave.
+
+    Each sample waits for the one before it, so that three columns cost hardly more than one.
 
     ``start`` is the first sample that is taken, ``step`` 1 or -1 the direction.
     """
     b0, b1, b2, a1, a2 = section[0], section[1], section[2], section[3], section[4]
     # The gain at frequency zero is one, so a constant goes through unchanged.
-    first = (1.0 - b0) * values[start]
-    second = (b2 - a2) * values[start]
+    first_0 = (1.0 - b0) * values[start, 0]
+    first_1 = (1.0 - b0) * values[start, 1]
+    first_2 = (1.0 - b0) * values[start, 2]
+    second_0 = (b2 - a2) * values[start, 0]
+    second_1 = (b2 - a2) * values[start, 1]
+    second_2 = (b2 - a2) * values[start, 2]
     k = start
     for _ in range(values.shape[0]):
-        x = values[k]
-        y = b0 * x + first
-        first = b1 * x - a1 * y + second
-        second = b2 * x - a2 * y
-        values[k] = y
+        x_0, x_1, x_2 = values[k, 0], values[k, 1], values[k, 2]
+        y_0 = b0 * x_0 + first_0
+        y_1 = b0 * x_1 + first_1
+        y_2 = b0 * x_2 + first_2
+        first_0 = b1 * x_0 - a1 * y_0 + second_0
+        first_1 = b1 * x_1 - a1 * y_1 + second_1
+        first_2 = b1 * x_2 - a1 * y_2 + second_2
+        second_0 = b2 * x_0 - a2 * y_0
+        second_1 = b2 * x_1 - a2 * y_1
+        second_2 = b2 * x_2 - a2 * y_2
+        values[k, 0] = y_0
+        values[k, 1] = y_1
+        values[k, 2] = y_2
         k += step
 
 
 @kernel
 def _there_and_back(section, signal, longer, filtered):
-    """Filter the columns of a signal (n, k) into ``filtered``; ``longer`` is room for one."""
+    """Filter the columns of a signal (n, k) into ``filtered``; ``longer`` is room for three."""
     n = signal.shape[0]
-    pad = (longer.size - n) // 2
-    for column in range(signal.shape[1]):
-        x = signal[:, column]
-        nothing = True
-        for k in range(n):
-            longer[pad + k] = x[k]
-            nothing &= x[k] == 0.0
-        # Nothing stays nothing: the second axis of a straight impact is not filtered.
-        if nothing:
-            filtered[:, column] = 0.0
-            continue
-        for k in range(pad):
-            longer[k] = 2.0 * x[0] - x[pad - k]
-            longer[pad + n + k] = 2.0 * x[n - 1] - x[n - 2 - k]
+    pad = (longer.shape[0] - n) // 2
+    for start in range(0, signal.shape[1], 3):
+        columns = min(3, signal.shape[1] - start)
+        for c in range(3):
+            column = start + min(c, columns - 1)
+            for k in range(n):
+                longer[pad + k, c] = signal[k, column]
+            for k in range(pad):
+                longer[k, c] = 2.0 * signal[0, column] - signal[pad - k, column]
+                longer[pad + n + k, c] = 2.0 * signal[n - 1, column] - signal[n - 2 - k, column]
         _pass(section, longer, 0, 1)
-        _pass(section, longer, longer.size - 1, -1)
-        for k in range(n):
-            filtered[k, column] = longer[pad + k]
+        _pass(section, longer, longer.shape[0] - 1, -1)
+        for c in range(columns):
+            for k in range(n):
+                filtered[k, start + c] = longer[pad + k, c]
 
 
 def filter_cfc(signal: ArrayLike, sampling_rate: float, frequency_class: float = 1000.0) -> Array:
@@ -116,6 +127,6 @@ def filter_cfc(signal: ArrayLike, sampling_rate: float, frequency_class: float =
     section = _sections(float(frequency_class), float(sampling_rate))
     columns = x.reshape(x.shape[0], -1)
     filtered = np.empty_like(columns)
-    longer = np.empty(x.shape[0] + 2 * min(x.shape[0] - 1, PADDING))
+    longer = np.empty((x.shape[0] + 2 * min(x.shape[0] - 1, PADDING), 3))
     _there_and_back(section, columns, longer, filtered)
     return filtered.reshape(x.shape)

@@ -23,12 +23,23 @@ from models.compilation import kernel
 Array = NDArray[np.float64]
 
 
+SLACK = 1.0 - 1e-9
+"""Share of the best value that a bound must reach: rounding must rule out no maximum."""
+
+
 @kernel
 def _value(area, length):
     if area <= 0.0 or length <= 0.0:
         return 0.0
     mean = area / length
     return length * mean * mean * math.sqrt(mean)
+
+
+@kernel
+def _may_beat(area, length, best):
+    """Return whether ``area^2.5 / length^1.5`` may exceed ``best``, by squares and no root."""
+    square = area * area
+    return square * square * area > SLACK * best * best * length * length * length
 
 
 @kernel
@@ -39,21 +50,49 @@ def _area_at(t, a, s, i, x):
 
 
 @kernel
+def _value_about_peak(t, a, s, window):
+    """Return the best value of some windows about the largest sample: a floor of the maximum."""
+    middle, n = 0, t.size
+    for i in range(n):
+        if a[i] > a[middle]:
+            middle = i
+    floor, i, j = 0.0, middle, middle
+    # Grow by the larger neighbour: what a hand would draw.
+    while True:
+        left = i > 0 and (j == n - 1 or a[i - 1] >= a[j + 1])
+        if left:
+            i -= 1
+        elif j < n - 1:
+            j += 1
+        else:
+            break
+        if t[j] - t[i] > window:
+            break
+        floor = max(floor, _value(s[j] - s[i], t[j] - t[i]))
+    return floor
+
+
+@kernel
 def _grid_maximum(t, a, s, window, peak):
     n = t.size
     limit = window * (1.0 + 1e-7)
     best, b1, b2 = 0.0, t[0], t[0]
+    # A little below a value that is reached, so that no maximum is ruled out.
+    floor = SLACK * _value_about_peak(t, a, s, window)
     last = 0
     for i in range(n - 1):
         while last < n - 1 and t[last + 1] - t[i] <= limit:
             last += 1
         # No window from here can beat (area over W) * peak^1.5.
-        if (s[last] - s[i]) * peak * math.sqrt(peak) <= best:
+        bar = max(best, floor)
+        if (s[last] - s[i]) * peak * math.sqrt(peak) <= bar:
             continue
         for j in range(i + 1, last + 1):
-            value = _value(s[j] - s[i], t[j] - t[i])
-            if value > best:
-                best, b1, b2 = value, t[i], t[j]
+            area, length = s[j] - s[i], t[j] - t[i]
+            if _may_beat(area, length, max(best, floor)):
+                value = _value(area, length)
+                if value > best:
+                    best, b1, b2 = value, t[i], t[j]
     return best, b1, b2
 
 
@@ -121,17 +160,20 @@ def _bound_window(t, a, s, window, best, b1, b2):
     while True:
         # Piece of x in which x lies in cell i and x + W in cell j.
         end = min(t[i + 1], t[j + 1] - window)
-        si = (a[i + 1] - a[i]) / (t[i + 1] - t[i])
-        sj = (a[j + 1] - a[j]) / (t[j + 1] - t[j])
-        candidates = (x, end, x)
-        if si != sj:
-            # a_j(x + W) = a_i(x)
-            zero = (a[i] - si * t[i] - a[j] + sj * (t[j] - window)) / (sj - si)
-            candidates = (x, end, min(max(zero, x), end))
-        for y in candidates:
-            v = _value(_area_at(t, a, s, j, y + window) - _area_at(t, a, s, i, y), window)
-            if v > best:
-                best, b1, b2 = v, y, y + window
+        # All of both cells is no less than what lies in the window.
+        area = s[j + 1] - s[i]
+        if _may_beat(area, window, best):
+            si = (a[i + 1] - a[i]) / (t[i + 1] - t[i])
+            sj = (a[j + 1] - a[j]) / (t[j + 1] - t[j])
+            candidates = (x, end, x)
+            if si != sj:
+                # a_j(x + W) = a_i(x)
+                zero = (a[i] - si * t[i] - a[j] + sj * (t[j] - window)) / (sj - si)
+                candidates = (x, end, min(max(zero, x), end))
+            for y in candidates:
+                v = _value(_area_at(t, a, s, j, y + window) - _area_at(t, a, s, i, y), window)
+                if v > best:
+                    best, b1, b2 = v, y, y + window
         if t[i + 1] <= end:
             i += 1
         if t[j + 1] - window <= end:
@@ -147,7 +189,15 @@ def _open_end(t, a, s, window, best, b1, b2):
     """Improve ``best`` over windows that start with the record or end with it."""
     n = t.size
     for side in range(2):
-        for k in range(n - 1):
+        first, last = 0, n - 1
+        # Cells further than a window from the open end hold no end of one.
+        if side == 0:
+            while last > 1 and t[last - 1] - t[0] > window:
+                last -= 1
+        else:
+            while first < n - 2 and t[n - 1] - t[first + 1] > window:
+                first += 1
+        for k in range(first, last):
             slope = (a[k + 1] - a[k]) / (t[k + 1] - t[k])
             # With u = length inside cell k: a(u) d(u) = 0.6 area(u), a quadratic in u.
             if side == 0:
@@ -200,10 +250,7 @@ def _continuous_maximum(t, a, s, window, peak):
             if area * power <= best:
                 continue
             shortest = t[j] - t[i + 1]
-            # area^2.5 / shortest^1.5 <= best, without dividing
-            if shortest > 0.0 and area * area * math.sqrt(area) <= best * shortest * math.sqrt(
-                shortest
-            ):
+            if not _may_beat(area, shortest, best):
                 continue
             v, x1, x2 = _free_pair(t, a, s, i, j, window, best)
             if v > best:
@@ -261,12 +308,43 @@ def head_injury_criterion(
         raise ValueError("acceleration must be a resultant, not negative")
     if not window > 0.0:
         raise ValueError(f"window must be positive, given {window}")
-    area = np.concatenate(([0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(t))))
-    window = min(float(window), float(t[-1] - t[0]))
-    if method == "grid":
-        best, start, end = _grid_maximum(t, a, area, window, float(a.max()))
-    elif method == "continuous":
-        best, start, end = _continuous_maximum(t, a, area, window, float(a.max()))
-    else:
+    if method not in ("continuous", "grid"):
         raise ValueError(f"method must be 'continuous' or 'grid', given {method!r}")
+    return maximise_window(t, a, cumulative_area(t, a), window, method=method)
+
+
+def cumulative_area(time: Array, acceleration: Array) -> Array:
+    """Return the area (n,) under a signal up to each sample, joined by straight lines.
+
+    Parameters
+    ----------
+    time : (n,) array
+        s.
+    acceleration : (n,) array
+        Any unit; the area has it times seconds.
+    """
+    parts = 0.5 * (acceleration[1:] + acceleration[:-1]) * np.diff(time)
+    return np.concatenate(([0.0], np.cumsum(parts)))
+
+
+def maximise_window(
+    time: Array, acceleration: Array, area: Array, window: float, *, method: str = "continuous"
+) -> tuple[float, float, float]:
+    """Return HIC and its window of a checked signal; see ``head_injury_criterion``.
+
+    Parameters
+    ----------
+    time : (n,) array
+        s, rising.
+    acceleration : (n,) array
+        g, finite and not negative.
+    area : (n,) array
+        As ``cumulative_area`` gives it.
+    window : float
+        Longest window in s.
+    method : {"continuous", "grid"}
+    """
+    longest = min(float(window), float(time[-1] - time[0]))
+    search = _continuous_maximum if method == "continuous" else _grid_maximum
+    best, start, end = search(time, acceleration, area, longest, float(acceleration.max()))
     return float(best), float(start), float(end)

@@ -52,7 +52,7 @@ def surface_mobility(tree: Tree, semi_axes: Array) -> Array:
     arms = np.zeros_like(semi_axes)
     rows = np.arange(semi_axes.shape[0])
     arms[rows, longest] = 0.5 * semi_axes[rows, longest]
-    return np.array([_mobility(tree, i, arm) for i, arm in enumerate(arms)])
+    return _mobility(tree, rows, arms)
 
 
 @inlined_kernel
@@ -104,15 +104,30 @@ def _damping_rate(tree: Tree, joints: Joints, motion: Motion) -> float:
     friction = joints.friction[:, None] / FRICTION_RATE * [1.0, 1.0, TWIST_FRICTION]
     root = np.sqrt(joints.damping + friction).ravel()
     root[:3] = 0.0
-    matrix = root[:, None] * mobility * root
-    vector = root / max(float(np.linalg.norm(root)), 1e-300)
+    return float(_largest_eigenvalue(root[:, None] * mobility * root, root.copy(), np.empty(3 * n)))
+
+
+@kernel
+def _largest_eigenvalue(matrix, vector, turned):
+    """Return the largest eigenvalue of a symmetric matrix, by power iteration from a vector."""
+    n = vector.size
     rate = 0.0
-    for _ in range(SWEEPS):
-        turned = matrix @ vector
-        rate = float(np.linalg.norm(turned))
+    for sweep in range(SWEEPS + 1):
+        if sweep > 0:
+            for i in range(n):
+                turned[i] = 0.0
+                for j in range(n):
+                    turned[i] += matrix[i, j] * vector[j]
+            for i in range(n):
+                vector[i] = turned[i]
+        square = 0.0
+        for i in range(n):
+            square += vector[i] * vector[i]
+        rate = math.sqrt(square)
         if rate == 0.0:
             break
-        vector = turned / rate
+        for i in range(n):
+            vector[i] /= rate
     return rate
 
 
@@ -143,22 +158,35 @@ def _bushing_rate(tree: Tree, joints: Joints) -> float:
 
     By the mass that two segments, free of all others, put against each other at the joint point.
     """
-    rates = [0.0]
-    for i in np.flatnonzero(tree.yields):
-        parent = tree.parent[i]
-        mobility = _mobility(tree, int(i), tree.centre_from_joint[i]) + _mobility(
-            tree, int(parent), tree.joint_in_parent[i] - tree.centre_from_joint[parent]
-        )
-        stiffness = max(joints.give_low[i].max(), joints.give_high[i].max())
-        rates += [
-            float(joints.give_damping[i].max() * mobility),
-            STABLE / RESOLVED * math.sqrt(BEYOND * stiffness * mobility),
-        ]
-    return max(rates)
+    rows = np.flatnonzero(tree.yields)
+    if not rows.size:
+        return 0.0
+    parents = tree.parent[rows]
+    mobility = _mobility(tree, rows, tree.centre_from_joint[rows]) + _mobility(
+        tree, parents, tree.joint_in_parent[rows] - tree.centre_from_joint[parents]
+    )
+    stiffness = np.maximum(joints.give_low[rows].max(axis=1), joints.give_high[rows].max(axis=1))
+    damped = joints.give_damping[rows].max(axis=1) * mobility
+    sprung = STABLE / RESOLVED * np.sqrt(BEYOND * stiffness * mobility)
+    return float(np.maximum(damped, sprung).max())
 
 
-def _mobility(tree: Tree, i: int, arm: Array) -> float:
-    """Return the largest acceleration (1/kg) of a point of a free segment per unit force at it."""
-    cross = np.array([[0.0, -arm[2], arm[1]], [arm[2], 0.0, -arm[0]], [-arm[1], arm[0], 0.0]])
-    turned = cross.T @ np.diag(1.0 / tree.inertia[i]) @ cross
-    return float(np.linalg.eigvalsh(np.eye(3) / tree.mass[i] + turned)[-1])
+def _mobility(tree: Tree, rows: NDArray[np.int64], arms: Array) -> Array:
+    """Return the largest acceleration (k,) 1/kg of points of free segments per unit force at them.
+
+    Parameters
+    ----------
+    tree : Tree
+    rows : (k,) segments.
+    arms : (k, 3) m, of the points from the centres of mass.
+    """
+    x, y, z = arms.T
+    none = np.zeros_like(x)
+    cross = np.stack(
+        [np.stack([none, -z, y], -1), np.stack([z, none, -x], -1), np.stack([-y, x, none], -1)],
+        axis=1,
+    )
+    turned = (np.swapaxes(cross, 1, 2) * (1.0 / tree.inertia[rows])[:, None, :]) @ cross
+    return np.asarray(
+        np.linalg.eigvalsh(np.eye(3) / tree.mass[rows][:, None, None] + turned)[:, -1]
+    )

@@ -1,5 +1,6 @@
 """Joint resistance of a pedestrian, scaled from the 7-year-old reference."""
 
+import functools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -7,7 +8,7 @@ from numpy.typing import NDArray
 
 from models import data
 from models.pedestrian.anthropometry import SEGMENTS, Body, region_of
-from models.pedestrian.scaling import Scale, scale_between
+from models.pedestrian.scaling import scale_between
 from models.rotation import axis_rotation, multiply
 
 Array = NDArray[np.float64]
@@ -76,9 +77,40 @@ def build_joints(
     shoulder_stiffness : float
         Factor on the stiffness of the shoulder girdle, its damping following by the square root.
     """
-    table = data.load("pedestrians/joints.toml")
     reference = data.load("pedestrians/segments.toml")["child_7y"]
     scale = scale_between(body.stature, body.age, reference["stature"], reference["age"])
+    base = _reference_joints()
+    factor = np.where(_NECK_ROWS, neck_stiffness, 1.0)[:, None]
+    moment = scale.moment * factor
+    # Friction holds the limb's weight: it follows mass times length, not tissue.
+    weight = body.body_mass * body.stature / (reference["body_mass"] * reference["stature"])
+    joints = base._replace(
+        stiffness_low=base.stiffness_low * moment,
+        stiffness_high=base.stiffness_high * moment,
+        stop_low=base.stop_low * moment,
+        stop_high=base.stop_high * moment,
+        damping=base.damping * scale.rotational_damping * factor,
+        friction=base.friction * weight * muscle_tone,
+        give_low=base.give_low * scale.stiffness,
+        give_high=base.give_high * scale.stiffness,
+        give_damping=base.give_damping * scale.damping,
+        give_range=base.give_range * scale.length,
+    )
+    joints.give_high[SEGMENTS.index("head"), 2] *= neck_tension_stiffness
+    for i in (SEGMENTS.index("upper_arm_left"), SEGMENTS.index("upper_arm_right")):
+        joints.give_low[i] *= shoulder_stiffness
+        joints.give_high[i] *= shoulder_stiffness
+        joints.give_damping[i] *= np.sqrt(shoulder_stiffness)
+    return joints
+
+
+_NECK_ROWS = np.array([region_of(segment) in NECK_JOINTS for segment in SEGMENTS])
+
+
+@functools.cache
+def _reference_joints() -> Joints:
+    """Return the joints of the 7-year-old as the data file has them."""
+    table = data.load("pedestrians/joints.toml")
     n = len(SEGMENTS)
     joints = Joints(
         centre=np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)),
@@ -98,17 +130,15 @@ def build_joints(
         give_range=np.full(n, np.inf),
     )
     for i, segment in enumerate(SEGMENTS):
-        region = region_of(segment)
         if i == 0:
             continue
-        row = table["joints"][region]
-        factor = neck_stiffness if region in NECK_JOINTS else 1.0
+        row, right = table["joints"][region_of(segment)], segment.endswith("_right")
         middle = np.zeros(3)
         for k, axis in enumerate("xyz"):
             low, high = row["range"][axis]
             stiff = row["stiffness"][axis]
             stop = row["stop"][axis]
-            if segment.endswith("_right") and axis != "y":
+            if right and axis != "y":
                 low, high = -high, -low
                 stiff, stop = stiff[::-1], stop[::-1]
             middle[k] = np.radians(0.5 * (low + high))
@@ -120,44 +150,23 @@ def build_joints(
             axis_rotation(0, middle[0]),
             multiply(axis_rotation(1, middle[1]), axis_rotation(2, middle[2])),
         )
-        moment = scale.moment * factor
-        for array in (
-            joints.stiffness_low,
-            joints.stiffness_high,
-            joints.stop_low,
-            joints.stop_high,
-        ):
-            array[i] *= moment
-        joints.damping[i] = np.array(row["damping"]) * scale.rotational_damping * factor
-        # Friction holds the limb's weight: it follows mass times length, not tissue.
-        weight = body.body_mass * body.stature / (reference["body_mass"] * reference["stature"])
-        joints.friction[i] = row["friction"] * weight * muscle_tone
+        joints.damping[i] = row["damping"]
+        joints.friction[i] = row["friction"]
         if "give" in row:
-            _let_yield(joints, i, row["give"], scale, mirrored=segment.endswith("_right"))
-    tension = SEGMENTS.index("head"), 2
-    joints.give_high[tension] *= neck_tension_stiffness
-    for i in (SEGMENTS.index("upper_arm_left"), SEGMENTS.index("upper_arm_right")):
-        joints.give_low[i] *= shoulder_stiffness
-        joints.give_high[i] *= shoulder_stiffness
-        joints.give_damping[i] *= np.sqrt(shoulder_stiffness)
+            _let_yield(joints, i, row["give"], mirrored=right)
     return joints
 
 
-def _let_yield(
-    joints: Joints, i: int, row: dict[str, Any], scale: Scale, *, mirrored: bool
-) -> None:
+def _let_yield(joints: Joints, i: int, row: dict[str, Any], *, mirrored: bool) -> None:
     """Let the points of a joint part against the springs and dampers of its table."""
     joints.yields[i] = True
     for k, axis in enumerate("xyz"):
         low, high = row["stiffness"][axis]
         if mirrored and axis == "y":
             low, high = high, low
-        joints.give_low[i, k], joints.give_high[i, k] = (
-            low * scale.stiffness,
-            high * scale.stiffness,
-        )
-    joints.give_damping[i] = np.array(row["damping"]) * scale.damping
-    joints.give_range[i] = row["range"] * scale.length
+        joints.give_low[i, k], joints.give_high[i, k] = low, high
+    joints.give_damping[i] = row["damping"]
+    joints.give_range[i] = row["range"]
 
 
 def joints_of(joints: Joints, rows: list[int]) -> Joints:

@@ -43,16 +43,16 @@ class Posture:
     angular_velocity: Array
 
 
+_LEG = {"thigh": "hip", "shank": "knee", "foot": "ankle"}
+
+
 @functools.cache
-def _gait() -> dict[str, CubicSpline]:
+def _gait() -> CubicSpline:
+    """Return the flexion (rad) of hip, knee and ankle over the gait cycle."""
     table = data.load("gait/running.toml")
     phase = np.append(table["phase"], 1.0)
-    return {
-        name: CubicSpline(
-            phase, np.radians(np.append(table[name], table[name][0])), bc_type="periodic"
-        )
-        for name in ("hip", "knee", "ankle")
-    }
+    angles = [np.radians(np.append(table[name], table[name][0])) for name in _LEG.values()]
+    return CubicSpline(phase, np.stack(angles, axis=1), bc_type="periodic")
 
 
 def cycle_frequency(running_speed: float, stature: float) -> float:
@@ -77,12 +77,10 @@ def joint_flexion(phase: float) -> dict[str, tuple[float, float]]:
         Keys are the regions of the outer segments: thigh (hip joint), shank (knee), foot (ankle),
         upper_arm (shoulder), forearm (elbow).
     """
-    table, splines = data.load("gait/running.toml"), _gait()
+    table, spline = data.load("gait/running.toml"), _gait()
     p = phase % 1.0
-    flexion = {
-        region: (float(splines[name](p)), float(splines[name](p, 1)))
-        for region, name in (("thigh", "hip"), ("shank", "knee"), ("foot", "ankle"))
-    }
+    angles, rates = spline(p).tolist(), spline(p, 1).tolist()
+    flexion = dict(zip(_LEG, zip(angles, rates, strict=True), strict=True))
     # The arm swings against the leg of its side: back when the hip is most flexed.
     forward = _most_flexed_phase()
     amplitude = math.radians(table["shoulder_amplitude"])
@@ -98,7 +96,7 @@ def joint_flexion(phase: float) -> dict[str, tuple[float, float]]:
 @functools.cache
 def _most_flexed_phase() -> float:
     grid = np.linspace(0.0, 1.0, 1001)
-    return float(grid[np.argmax(_gait()["hip"](grid))])
+    return float(grid[np.argmax(_gait()(grid)[:, 0])])
 
 
 def _braced_flexion(region: str) -> float:
@@ -157,7 +155,8 @@ def running_posture(
             # The two neck joints share the work of keeping the face upright.
             pitch[i] -= 0.5 * lean
     heading = axis_rotation(2, facing_angle)
-    orientation = np.array([multiply(heading, axis_rotation(1, angle)) for angle in pitch])
+    leaning = np.array([axis_rotation(1, angle) for angle in pitch.tolist()])
+    orientation = multiply(heading, leaning.T).T.copy()
     lateral = matrix_of(heading)[:, 1]
     forward = matrix_of(heading)[:, 0]
     root = np.array([0.0, 0.0, -_lowest_point(body, orientation)])
@@ -166,7 +165,10 @@ def running_posture(
 
 def segment_centres(body: Body, orientation: Array, root_position: Array) -> Array:
     """Return the (15, 3) centres of mass for segment orientations and a root position."""
-    rotation = np.array([matrix_of(q) for q in orientation])
+    return _centres(body, np.array([matrix_of(q) for q in orientation]), root_position)
+
+
+def _centres(body: Body, rotation: Array, root_position: Array) -> Array:
     centre = np.empty((len(SEGMENTS), 3))
     centre[0] = root_position
     for i, parent in enumerate(PARENTS):
@@ -178,10 +180,10 @@ def segment_centres(body: Body, orientation: Array, root_position: Array) -> Arr
 
 def _lowest_point(body: Body, orientation: Array) -> float:
     """Return the height of the body's lowest point with the root's centre at the origin."""
-    centre = segment_centres(body, orientation, np.zeros(3))
+    rotation = np.array([matrix_of(q) for q in orientation])
+    centre = _centres(body, rotation, np.zeros(3))
     low = np.inf
-    for i, q in enumerate(orientation):
-        rotation = matrix_of(q)
-        height = centre[i, 2] + rotation[2] @ (body.ellipsoid[i] - body.centre[i])
-        low = min(low, height - float(np.linalg.norm(rotation[2] * body.semi_axes[i])))
+    for i, upward in enumerate(rotation[:, 2]):
+        height = centre[i, 2] + upward @ (body.ellipsoid[i] - body.centre[i])
+        low = min(low, height - float(np.linalg.norm(upward * body.semi_axes[i])))
     return low

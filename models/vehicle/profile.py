@@ -68,6 +68,27 @@ class Vehicle:
         """How far out (z,) m each zone keeps bending: with those beside it."""
         return np.array([_widest(self.zones, zone) for zone in self.zones])
 
+    @functools.cached_property
+    def zone_table(self) -> Zones:
+        """The zones of the static car in compiled form, without boxes and friction."""
+        zones = self.zones
+        return Zones(
+            kind=np.array([z.kind for z in zones]),
+            origin=np.array([z.origin for z in zones]),
+            radius=np.array([z.radius for z in zones]),
+            direction=np.array([z.direction for z in zones]),
+            length=np.array([z.length for z in zones]),
+            arc=np.array([z.arc for z in zones]),
+            inner=np.array([z.inner for z in zones]),
+            half_width=np.array([z.half_width for z in zones]),
+            curvature=np.array([z.curvature for z in zones]),
+            bend=self.bend,
+            joined=self.joined,
+            box=np.zeros((len(zones), 4)),
+            friction=np.zeros(len(zones)),
+            ploughing=np.array([z.ploughing for z in zones]),
+        )
+
     def zone_index(self, name: str) -> int:
         """Return the row of a zone; -1 if the car has none of that name."""
         for j, zone in enumerate(self.zones):
@@ -140,12 +161,9 @@ def _dive_shift(vehicle: Vehicle, dive_angle: float) -> Array:
     """Return the (x, z) shift after the turn about the origin that keeps the front at x = 0."""
     pivot = np.array([-vehicle.dive_pivot, 0.0])
     shift = pivot - _turn(pivot, dive_angle)
-    front = max(
-        float(_turn(zone.origin, dive_angle)[0]) + zone.radius
-        for zone in vehicle.zones
-        if zone.kind == ROLL
-    )
-    return np.array([-front, float(shift[1])])
+    rolls = vehicle.zone_table.kind == ROLL
+    turned = _turn(vehicle.zone_table.origin, dive_angle)[:, 0] + vehicle.zone_table.radius
+    return np.array([-float(turned[rolls].max()), float(shift[1])])
 
 
 def build_zones(
@@ -159,35 +177,25 @@ def build_zones(
     dive_angle : rad, nose down. friction_body_car : 1.
     ploughing : factor on the ploughing of all panels.
     """
-    zones = vehicle.zones
+    table = vehicle.zone_table
     shift = _dive_shift(vehicle, dive_angle)
-    origin = np.array([_turn(z.origin, dive_angle) + shift for z in zones])
-    radius = np.array([z.radius for z in zones])
-    direction = np.array([_turn(z.direction, dive_angle) for z in zones])
-    length = np.array([z.length for z in zones])
-    end = origin + length[:, None] * direction
-    sweep = np.array([0.5 * z.curvature * z.half_width**2 for z in zones])
-    depth = np.array([MAXIMUM_DEPTH if z.kind == PANEL else 0.0 for z in zones])
+    origin = _turn(table.origin, dive_angle) + shift
+    direction = _turn(table.direction, dive_angle)
+    end = origin + table.length[:, None] * direction
     low, high = np.minimum(origin, end), np.maximum(origin, end)
+    depth = np.where(table.kind == PANEL, MAXIMUM_DEPTH, 0.0)
+    sweep = 0.5 * table.curvature * table.half_width**2
     box = np.stack(
-        [low[:, 0] - radius - sweep, high[:, 0] + radius, low[:, 1] - radius - depth,
-         high[:, 1] + radius], axis=1,
+        [low[:, 0] - table.radius - sweep, high[:, 0] + table.radius,
+         low[:, 1] - table.radius - depth, high[:, 1] + table.radius], axis=1,
     )  # fmt: skip
-    return Zones(
-        kind=np.array([z.kind for z in zones]),
+    return table._replace(
         origin=origin,
-        radius=radius,
         direction=direction,
-        length=length,
-        arc=np.array([z.arc - dive_angle for z in zones]),
-        inner=np.array([z.inner for z in zones]),
-        half_width=np.array([z.half_width for z in zones]),
-        curvature=np.array([z.curvature for z in zones]),
-        bend=vehicle.bend,
-        joined=vehicle.joined,
+        arc=table.arc - dive_angle,
         box=box,
-        friction=np.full(len(zones), friction_body_car),
-        ploughing=np.array([ploughing * z.ploughing for z in zones]),
+        friction=np.full(len(vehicle.zones), friction_body_car),
+        ploughing=ploughing * table.ploughing,
     )
 
 

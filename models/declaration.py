@@ -30,15 +30,22 @@ def read_outputs(table: dict[str, Any]) -> tuple[Output, ...]:
 
 
 def run_rows(
-    model: Model, rows: Array, evaluate: Callable[[dict[str, float]], tuple[str, dict[str, float]]]
+    model: Model,
+    rows: Array,
+    evaluate: Callable[[dict[str, float]], tuple[str, dict[str, float]]],
+    started: Callable[[int], None] | None = None,
 ) -> Batch:
     """Return the batch of (n, inputs) rows, each evaluated on its own.
 
     Parameters
     ----------
     model : Model
-    rows : (n, inputs) in the order of ``model.inputs``.
-    evaluate : gives status and outputs by name for the inputs by name.
+    rows : (n, inputs) array
+        In the order of ``model.inputs``.
+    evaluate : callable
+        Gives status and outputs by name for the inputs by name.
+    started : callable, optional
+        Called with the number of each row before it is evaluated.
 
     Raises
     ------
@@ -49,11 +56,18 @@ def run_rows(
     rows = np.asarray(rows, dtype=np.float64)
     if rows.ndim != 2 or rows.shape[1] != len(names):
         raise ValueError(f"rows must have shape (n, {len(names)}), given {rows.shape}")
+    low = np.array([item.low for item in model.inputs])
+    high = np.array([item.high for item in model.inputs])
+    outside = ~((rows >= low) & (rows <= high)).all(axis=1)
+    if outside.any():
+        # The first of them says which input it is.
+        complete_inputs(model, dict(zip(names, rows[np.argmax(outside)].tolist(), strict=True)))
     table = np.empty((rows.shape[0], len(model.outputs)))
     status = []
-    for k, row in enumerate(rows):
-        values = complete_inputs(model, dict(zip(names, row.tolist(), strict=True)))
-        word, outputs = evaluate(values)
+    for k, row in enumerate(rows.tolist()):
+        if started is not None:
+            started(k)
+        word, outputs = evaluate(dict(zip(names, row, strict=True)))
         status.append(word)
         table[k] = [outputs[item.name] for item in model.outputs]
     return Batch(table, status)

@@ -196,8 +196,8 @@ class Model(Protocol):
     ) -> Run:
         """Run once for what a test records: channels ``<group>_<channel>`` and outputs by name."""
 
-    def run_batch(self, rows: Array) -> Batch:
-        """Run (n, inputs) rows."""
+    def run_batch(self, rows: Array, started: Callable[[int], None] | None = None) -> Batch:
+        """Run (n, inputs) rows, calling ``started`` with the number of each before it is run."""
 
 
 def complete_status(model: Model) -> frozenset[str]:

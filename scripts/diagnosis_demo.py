@@ -23,9 +23,9 @@ from mcstudy.text import percent
 from studies.diagnosis import extension, words
 from studies.diagnosis.report import summarise
 from studies.diagnosis.study import diagnose
-from studies.execution import publish
 from studies.injury.analysis import CASES
 from studies.injury.study import run_injury
+from studies.publishing import publish
 from studies.validation.diagnosis.hidden_effects import Hidden, make_tests
 
 INJURY_STUDY = Path("configs/demo_injury.toml")

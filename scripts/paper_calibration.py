@@ -15,12 +15,13 @@ Run as ``python -m scripts.paper_calibration``; it prints the values and changes
 
 import argparse
 import math
+from functools import partial
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import NDArray
-from scipy.optimize import minimize
+from scipy.optimize import OptimizeResult, minimize
 
+from mcstudy.execution.workers import run_jobs
 from models.pedestrian.growth import parameters
 from models.registry import load_model
 
@@ -106,32 +107,31 @@ def calibrate(draws: int, workers: int, seed: int) -> tuple[Array, float]:
     x = np.column_stack(
         [rng.uniform(size=draws), rng.normal(means, 0.8 * spreads, (draws, means.size))]
     )
-    scores = Parallel(n_jobs=workers)(delayed(misfit)(row) for row in x)
+    scores = run_jobs(misfit, x, workers)
     # The objective has several basins along the gait: refine the best start of each eighth.
     order = np.argsort(scores)
     part = (8.0 * x[order, 0]).astype(int)
     starts = [int(order[np.argmax(part == k)]) for k in range(8) if (part == k).any()]
     best = sorted(starts, key=lambda k: scores[k])[:4]
     steps = np.concatenate([[0.03], 0.3 * spreads])
-    found = Parallel(n_jobs=workers)(
-        delayed(minimize)(
-            misfit,
-            x[k],
-            args=(COPIES,),
-            method="Nelder-Mead",
-            options={
-                "maxfev": 130,
-                "initial_simplex": np.vstack([x[k], x[k] + np.diag(steps)]),
-            },
-        )
-        for k in best
-    )
+    found = run_jobs(partial(_refine, steps=steps), [x[k] for k in best], workers)
     for result in sorted(found, key=lambda result: result.fun):
         print(f"basin: objective {result.fun:.2f} at", np.round(result.x, 4))
         outputs = mean_outputs(result.x, 20)
         print("   ", {name: float(f"{outputs[name]:.4g}") for name in REPORTED})
     winner = min(found, key=lambda result: result.fun)
     return np.asarray(winner.x), float(winner.fun)
+
+
+def _refine(start: Array, steps: Array) -> OptimizeResult:
+    """Return the nearest optimum to a start."""
+    return minimize(
+        misfit,
+        start,
+        args=(COPIES,),
+        method="Nelder-Mead",
+        options={"maxfev": 130, "initial_simplex": np.vstack([start, start + np.diag(steps)])},
+    )
 
 
 def main() -> None:

@@ -20,7 +20,6 @@ from mcstudy.files import read_study_text
 from mcstudy.report import Table
 from mcstudy.studyfile.config import ModelComparison, Reconstruction, Study, load_study, parse_study
 from models.protocol import Run
-from studies.execution import columns_of, load_study_model
 from studies.injury import report as injury_report
 from studies.injury import study as injury
 from studies.model_comparison import report as model_comparison_report
@@ -30,6 +29,7 @@ from studies.monte_carlo import study as monte_carlo
 from studies.morris import report as morris_report
 from studies.morris import study as morris
 from studies.reconstruction import Comparison, reconstruct, write_reconstruction
+from studies.runs import columns_of, load_study_model
 from studies.sobol import report as sobol_report
 from studies.sobol import study as sobol
 

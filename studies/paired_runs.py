@@ -14,7 +14,7 @@ from mcstudy.execution.results import ResultsFolder, digest
 from mcstudy.execution.workers import Workers
 from mcstudy.studyfile.config import InjuryStudy, ModelComparison, MonteCarloStudy
 from models.protocol import Model
-from studies.execution import columns_of, run_rows
+from studies.runs import columns_of, run_rows
 
 Array = NDArray[np.float64]
 

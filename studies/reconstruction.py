@@ -15,8 +15,8 @@ from mcstudy.studyfile import config
 from mcstudy.studyfile.config import ComparisonTable, Reconstruction
 from mcstudy.text import number, quantity, unit
 from models.protocol import Model, Run, complete_status
-from studies.execution import load_study_model
 from studies.isomme_export import write_isomme
+from studies.runs import load_study_model
 
 PRIMARY = 0.12
 """s after first contact that the histories show: the impact on the car."""

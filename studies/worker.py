@@ -2,6 +2,7 @@
 
 import functools
 import json
+from collections.abc import Callable
 from typing import Any, TypedDict
 
 import numpy as np
@@ -27,14 +28,24 @@ def _model(name: str, options: str, effects: str, version: str) -> Model:
 
 
 def evaluate(
-    argument: ModelArgument, rows: NDArray[np.float64]
+    argument: ModelArgument, rows: NDArray[np.float64], started: Callable[[int], None]
 ) -> tuple[NDArray[np.float64], list[str]]:
-    """Run rows of inputs and return outputs and statuses."""
+    """Run rows of inputs and return outputs and statuses.
+
+    Parameters
+    ----------
+    argument : ModelArgument
+        Which model.
+    rows : (n, d) array
+        Inputs in the order of the model's.
+    started : callable
+        Called with the number of each row before it is run.
+    """
     model = _model(
         argument["name"],
         json.dumps(argument["options"], sort_keys=True),
         json.dumps(argument["effects"], sort_keys=True),
         argument["version"],
     )
-    batch = model.run_batch(rows)
+    batch = model.run_batch(rows, started)
     return batch.outputs, batch.status

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from scipy import special
 
@@ -29,6 +29,7 @@ from mcstudy.diagnosis.templates import (
     score_grid,
     smooth_discrepancy,
 )
+from mcstudy.execution.workers import run_jobs
 
 Array = NDArray[np.float64]
 
@@ -247,19 +248,18 @@ def rank_causes(
     centres = [centre for centre in found if centre is not None]
     taken = {form.cause for form in base.forms}
     forms = [form for c in causes if c.name not in taken for form in c.forms]
-    pool = Parallel(n_jobs=workers)
-    surveys = pool(delayed(survey)(problem, layouts, base.forms, centres, form) for form in forms)
+    surveys = run_jobs(partial(survey, problem, layouts, base.forms, centres), forms, workers)
     seen = sorted((s for s in surveys if s is not None), key=lambda s: s.misfit)
     best = max((s.promise for s in seen), default=0.0)
     promising = [
         s for k, s in enumerate(seen[:most]) if k < FEWEST or _may_win(s, seen[0].misfit, best)
     ]
-    first = pool(delayed(approach)(problem, layouts, base.forms, s) for s in promising)
+    first = run_jobs(partial(approach, problem, layouts, base.forms), promising, workers)
     reached = [found for found in first if found is not None]
     least = min((found.misfit for found in reached), default=0.0)
     # Only what is not hopeless beside the best is worth its repeatability.
     kept = [found for found in reached if found.misfit < HOPELESS * least + CLOSE]
-    fits = pool(delayed(settle)(problem, layouts, found) for found in kept)
+    fits = run_jobs(partial(settle, problem, layouts), kept, workers)
     candidates = []
     for cause in causes:
         own_fits = [

@@ -1,8 +1,9 @@
 """What a worker process runs of this package; it imports NumPy alone.
 
-Rows of a chunk are run one after the other under a *watch*: which row is under way stands in a
-small file that outlives the process, and a row that takes too long ends the process. Whoever finds
-the process dead reads from the file which row it was and whether it was too slow.
+A chunk of rows is evaluated as a whole; only if that fails, row by row. A *watchdog* keeps which
+row is under way in a small file that outlives the process, and ends a process in which a row takes
+too long. Whoever finds the process dead reads from the file which row it was and whether it was too
+slow.
 """
 
 import contextlib
@@ -19,19 +20,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Evaluate = Callable[[Any, Array], tuple[Array, list[str]]]
+Ids = NDArray[np.int64]
+Started = Callable[[int], None]
+"""Called with the number of a row, counted from 0, before it is run."""
+Evaluate = Callable[[Any, Array, Started], tuple[Array, list[str]]]
+"""Outputs (k, m) and k statuses of ``(argument, rows, started)``."""
 
 OK = "ok"
 ERROR, NOT_FINITE, UNPHYSICAL = "error", "not_finite", "unphysical"
 TIMEOUT, CRASHED = "timeout", "crashed"
 """Statuses that no model gives: they are the runner's own."""
 
+UNKNOWN = -1
+"""Number of the row under way where the evaluation does not tell."""
 _SPARE = 0.25
 """Share of the time limit after which the alarm is set anew; a row may take so much longer."""
 
 
-class Watch(TypedDict):
-    """Where the row under way is noted (empty: in a folder of its own), and s that it may take."""
+class Watchdog(TypedDict):
+    """Where the row under way is kept (empty: in a folder of its own), and s that it may take."""
 
     folder: str
     limit: float
@@ -39,9 +46,18 @@ class Watch(TypedDict):
 
 @dataclass(frozen=True)
 class ChunkResult:
-    """What comes back of a chunk: run ids, outputs (k, m), statuses, reasons, s that it took."""
+    """What comes back of a chunk.
 
-    ids: NDArray[np.int64]
+    Attributes
+    ----------
+    ids : (k,) run ids.
+    outputs : (k, m), NaN where a run failed.
+    status : k statuses, the model's or the runner's.
+    reason : k reasons for the runner's statuses, else empty.
+    seconds : wall time that the chunk took.
+    """
+
+    ids: Ids
     outputs: Array
     status: list[str]
     reason: list[str]
@@ -50,9 +66,17 @@ class ChunkResult:
 
 @dataclass(frozen=True)
 class Trace:
-    """What a dead process left: the row that was under way, and whether it was too slow."""
+    """What a dead process left of its chunk.
+
+    Attributes
+    ----------
+    run : run id of the row that was under way, ``UNKNOWN`` if the evaluation did not tell.
+    ids : (k,) run ids of the chunk.
+    timed_out : whether it took too long.
+    """
 
     run: int
+    ids: Ids
     timed_out: bool
 
 
@@ -61,70 +85,122 @@ def evaluate_chunk(
     argument: Any,
     bounds: Array,
     names: tuple[str, ...],
-    watch: Watch | None,
-    ids: NDArray[np.int64],
+    watchdog: Watchdog | None,
+    ids: Ids,
     rows: Array,
+    singly: bool = False,
 ) -> ChunkResult:
     """Run the rows of a chunk.
 
     Parameters
     ----------
-    evaluate, argument : outputs (1, m) and one status of ``(argument, row)``.
-    bounds : (m, 2) lowest and highest value that an output can have. names : of the outputs.
-    watch : none in the driver's own process.
-    ids : (k,) run ids. rows : (k, d).
+    evaluate : Evaluate
+        Outputs (k, m) and k statuses of rows.
+    argument : Any
+        Its first argument.
+    bounds : (m, 2) array
+        Lowest and highest value that an output can have.
+    names : tuple of str
+        Of the outputs.
+    watchdog : Watchdog or None
+        None in the driver's own process.
+    ids : (k,) array
+        Run ids.
+    rows : (k, d) array
+        Inputs.
+    singly : bool
+        Evaluate row by row from the start.
     """
     start = time.perf_counter()
-    outputs = np.full((len(ids), len(names)), np.nan)
-    status, reason = [], []
-    with _watched(watch, int(ids[0])) as note:
-        for k, run in enumerate(ids.tolist()):
-            note(run)
-            try:
-                found, words = evaluate(argument, rows[k : k + 1])
-                word, why = _judge(found[0], words[0], bounds, names)
-                if not why:
-                    outputs[k] = found[0]
-            except (KeyboardInterrupt, SystemExit, MemoryError):
-                raise
-            except Exception as error:
-                word, why = ERROR, " ".join(f"{type(error).__name__}: {error}".split())[:200]
-            status.append(word)
-            reason.append(why)
+    with _watched(watchdog, ids) as started:
+        found = (
+            None if singly and len(ids) > 1 else _evaluate_whole(evaluate, argument, rows, started)
+        )
+        if found is None:
+            found = _evaluate_singly(evaluate, argument, rows, started, len(names))
+    outputs, status, reason = found
+    _check_values(outputs, status, reason, bounds, names)
     return ChunkResult(ids, outputs, status, reason, time.perf_counter() - start)
 
 
-def _judge(outputs: Array, status: str, bounds: Array, names: tuple[str, ...]) -> tuple[str, str]:
-    """Return the status of a row and why it is not the model's own."""
-    if status == OK and not np.isfinite(outputs).all():
-        name = names[int(np.argmin(np.isfinite(outputs)))]
-        return NOT_FINITE, f"{name} has no finite value"
-    if np.isinf(outputs).any():
-        return NOT_FINITE, f"{names[int(np.argmax(np.isinf(outputs)))]} is infinite"
+Found = tuple[Array, list[str], list[str]]
+
+
+def _evaluate_whole(
+    evaluate: Evaluate, argument: Any, rows: Array, started: Started
+) -> Found | None:
+    """Return outputs, statuses and reasons of a chunk, or None if the evaluation raises."""
+    try:
+        outputs, status = evaluate(argument, rows, started)
+    except (KeyboardInterrupt, SystemExit, MemoryError):
+        raise
+    except Exception:
+        # Whatever a model raises is the fault of a row, which is found row by row.
+        return None
+    return np.array(outputs, dtype=np.float64), list(status), [""] * len(rows)
+
+
+def _evaluate_singly(
+    evaluate: Evaluate, argument: Any, rows: Array, started: Started, width: int
+) -> Found:
+    """Return outputs, statuses and reasons of rows that are evaluated one after the other."""
+    outputs = np.full((len(rows), width), np.nan)
+    status, reason = [], []
+    for k in range(len(rows)):
+        started(k)
+        try:
+            found, words = evaluate(argument, rows[k : k + 1], lambda _row: None)
+            outputs[k], word, why = found[0], words[0], ""
+        except (KeyboardInterrupt, SystemExit, MemoryError):
+            raise
+        except Exception as error:
+            word, why = ERROR, " ".join(f"{type(error).__name__}: {error}".split())[:200]
+        status.append(word)
+        reason.append(why)
+    return outputs, status, reason
+
+
+def _check_values(
+    outputs: Array, status: list[str], reason: list[str], bounds: Array, names: tuple[str, ...]
+) -> None:
+    """Give rows whose values are no result a status and a reason, and no values."""
+    finite = np.isfinite(outputs)
+    infinite = np.isinf(outputs)
     beyond = (outputs < bounds[:, 0]) | (outputs > bounds[:, 1])
-    if beyond.any():
-        k = int(np.argmax(beyond))
-        return UNPHYSICAL, (
-            f"{names[k]} = {outputs[k]:.4g} is outside {bounds[k, 0]:g} to {bounds[k, 1]:g}"
-        )
-    return status, ""
+    suspects = infinite.any(axis=1) | beyond.any(axis=1) | ~finite.all(axis=1)
+    for row in np.flatnonzero(suspects).tolist():
+        if reason[row]:
+            continue
+        if status[row] == OK and not finite[row].all():
+            name = names[int(np.argmin(finite[row]))]
+            status[row], reason[row] = NOT_FINITE, f"{name} has no finite value"
+        elif infinite[row].any():
+            name = names[int(np.argmax(infinite[row]))]
+            status[row], reason[row] = NOT_FINITE, f"{name} is infinite"
+        elif beyond[row].any():
+            k = int(np.argmax(beyond[row]))
+            low, high = bounds[k]
+            status[row] = UNPHYSICAL
+            reason[row] = f"{names[k]} = {outputs[row, k]:.4g} is outside {low:g} to {high:g}"
+        if reason[row]:
+            outputs[row] = np.nan
 
 
 @contextlib.contextmanager
-def _watched(watch: Watch | None, first: int) -> Iterator[Callable[[int], None]]:
-    """Give a function that notes which row begins, and keep the alarm set meanwhile."""
-    if watch is None:
-        yield lambda _run: None
+def _watched(watchdog: Watchdog | None, ids: Ids) -> Iterator[Started]:
+    """Give a function that keeps which row begins, and keep the alarm set meanwhile."""
+    if watchdog is None:
+        yield lambda _row: None
         return
-    folder = watch["folder"] or tempfile.mkdtemp(prefix="mcstudy-")
-    place = Path(folder) / f"{first:09d}-{os.getpid()}"
+    folder = watchdog["folder"] or tempfile.mkdtemp(prefix="mcstudy-")
+    place = Path(folder) / f"{int(ids[0]):09d}-{os.getpid()}"
     slow = place.with_suffix(".slow")
-    limit = watch["limit"]
+    limit = watchdog["limit"]
     handle = os.open(place, os.O_CREAT | os.O_WRONLY | os.O_TRUNC)
     armed = -np.inf
     with slow.open("w") as report:
 
-        def note(run: int) -> None:
+        def keep(run: int) -> None:
             nonlocal armed
             os.pwrite(handle, run.to_bytes(8, "little", signed=True), 0)
             now = time.perf_counter()
@@ -132,14 +208,16 @@ def _watched(watch: Watch | None, first: int) -> Iterator[Callable[[int], None]]
                 faulthandler.dump_traceback_later((1.0 + _SPARE) * limit, exit=True, file=report)
                 armed = now
 
+        os.pwrite(handle, ids.astype("<i8").tobytes(), 8)
+        keep(UNKNOWN if len(ids) > 1 else int(ids[0]))
         try:
-            yield note
+            yield lambda row: keep(int(ids[row]))
         finally:
             faulthandler.cancel_dump_traceback_later()
             os.close(handle)
     place.unlink(missing_ok=True)
     slow.unlink(missing_ok=True)
-    if not watch["folder"]:
+    if not watchdog["folder"]:
         Path(folder).rmdir()
 
 
@@ -151,9 +229,10 @@ def read_traces(folder: Path) -> list[Trace]:
         if place.suffix == ".slow":
             continue
         content = place.read_bytes()
-        if len(content) == 8:
-            run = int.from_bytes(content, "little", signed=True)
-            traces.append(Trace(run, slow.exists() and slow.stat().st_size > 0))
+        if len(content) >= 16:
+            run, *ids = np.frombuffer(content, dtype="<i8").tolist()
+            timed_out = slow.exists() and slow.stat().st_size > 0
+            traces.append(Trace(run, np.array(ids, dtype=np.int64), timed_out))
     for place in folder.glob("[0-9]*"):
         place.unlink(missing_ok=True)
     return traces

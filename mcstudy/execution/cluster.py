@@ -18,7 +18,7 @@ import joblib
 from joblib import _dask
 
 from mcstudy.errors import UserError
-from mcstudy.execution.runner import LostChunk
+from mcstudy.execution.evaluator import LostChunk
 
 CONNECT_TIME = 20.0
 """s in which a scheduler and a first worker must answer."""

@@ -2,9 +2,13 @@
 
 import contextlib
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeVar
 
 import joblib
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 Workers = int | str
 """Processes of this machine (-1: one a core, two at least), or the address of a dask scheduler
@@ -12,8 +16,12 @@ Workers = int | str
 
 
 @contextlib.contextmanager
-def at_work(workers: Workers) -> Iterator[None]:
-    """Let the runner use processes of this machine, or a cluster.
+def parallel_backend(workers: Workers) -> Iterator[None]:
+    """Let evaluators use processes of this machine, or a cluster.
+
+    Parameters
+    ----------
+    workers : processes, -1 for one a core, or the address of a dask scheduler.
 
     Raises
     ------
@@ -33,3 +41,23 @@ def at_work(workers: Workers) -> Iterator[None]:
     n_jobs = max(2, os.cpu_count() or 1) if workers == -1 else workers
     with joblib.parallel_config(backend="loky", n_jobs=n_jobs):
         yield
+
+
+def run_jobs(
+    function: Callable[[Item], Result], items: Iterable[Item], workers: int
+) -> list[Result]:
+    """Return what a function gives for each item, in their order, by processes of this machine.
+
+    For work that is no row of a model: fits, trials. Rows go through an ``Evaluator``.
+
+    Parameters
+    ----------
+    function : callable
+        Top-level function of one item.
+    items : iterable
+    workers : int
+        Processes, -1 for one a core.
+    """
+    with parallel_backend(workers):
+        found: list[Result] = joblib.Parallel()(joblib.delayed(function)(item) for item in items)
+    return found

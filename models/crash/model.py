@@ -2,7 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,19 +107,22 @@ class CrashModel(ABC):
         """
         return self._run(complete_inputs(self, inputs), outputs, channels, scene=False)
 
-    def run_batch(self, rows: Array) -> Batch:
+    def run_batch(self, rows: Array, started: Callable[[int], None] | None = None) -> Batch:
         """Run rows of inputs.
 
         Parameters
         ----------
-        rows : (n, inputs) in the order of ``inputs``, SI units.
+        rows : (n, inputs) array
+            In the order of ``inputs``, SI units.
+        started : callable, optional
+            Called with the number of each row before it is run.
 
         Raises
         ------
         ValueError
             If the array has another number of columns or a value outside its range.
         """
-        return run_rows(self, rows, self._row)
+        return run_rows(self, rows, self._row, started)
 
     @abstractmethod
     def _step(self, values: dict[str, float]) -> outcome.Raw | None:

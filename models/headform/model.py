@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -222,19 +222,22 @@ class HeadformModel:
         ended = "separation" if status == OK else status
         return Run(values, status, ended, measured, outcome.histories(test, channels))
 
-    def run_batch(self, rows: Array) -> Batch:
+    def run_batch(self, rows: Array, started: Callable[[int], None] | None = None) -> Batch:
         """Run rows of inputs.
 
         Parameters
         ----------
-        rows : (n, inputs) in the order of ``inputs``, SI units.
+        rows : (n, inputs) array
+            In the order of ``inputs``, SI units.
+        started : callable, optional
+            Called with the number of each row before it is run.
 
         Raises
         ------
         ValueError
             If the array has another number of columns or a value outside its range.
         """
-        return run_rows(self, rows, lambda values: self._judge(self._strike(values)))
+        return run_rows(self, rows, lambda values: self._judge(self._strike(values)), started)
 
     def hood_curve(self, values: Mapping[str, float]) -> ForceCurve:
         """Return the loading curve struck for inputs by name (all of them)."""

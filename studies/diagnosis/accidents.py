@@ -11,12 +11,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from mcstudy.diagnosis.problem import Cause, Form, Problem, Scalar, Test, Unknown, value_at
 from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.progress import follow
+from mcstudy.execution.workers import parallel_backend
 from mcstudy.injury.ais import Mechanism, draw_ais, mix
 from mcstudy.injury.functions import risk_function
 from mcstudy.measurement.measured_data import HEADER, Measured
@@ -34,13 +34,12 @@ from studies.diagnosis.emulator import (
     quadratic_terms,
 )
 from studies.diagnosis.model_choice import ModelChoice
-from studies.worker import evaluate
+from studies.runs import evaluator_of
 
 Array = NDArray[np.float64]
 
 POOL, PAIRED = 480, 120
 """Runs of the model as it stands, and of each form of a cause."""
-CHUNK = 20
 FARTHEST = 2.5
 """Score at which the sizes of causes that are tried end."""
 MOST_FAILED = 0.2
@@ -99,8 +98,8 @@ def build_collection(
     model = load_model(choice.name, choice.options, choice.effects)
     outputs = _outputs_of(data, model)
     draws = _draw(problem, choice, model, seed)
-    with Parallel(n_jobs=workers) as pool:
-        raw = _run(pool, choice, {}, draws.columns, POOL)
+    with parallel_backend(workers):
+        raw = _run(choice, {}, draws.columns, POOL)
         base = _outcomes(model, raw, outputs, draws, POOL)
         names = _variables(problem)
         table = np.stack([draws.columns[name] for name in names], axis=1)
@@ -111,7 +110,7 @@ def build_collection(
         changes = []
         forms = [form for cause in causes for form in cause.forms]
         for k, form in enumerate(follow(forms, "forms of causes", quiet=quiet)):
-            change = _change_of(pool, choice, form, draws, base, points, outputs, seed + k, model)
+            change = _change_of(choice, form, draws, base, points, outputs, seed + k, model)
             if change is not None:
                 changes.append(change)
     scatter = np.sqrt(np.nanmean(left**2, axis=0) * POOL / (POOL - len(coefficients)))
@@ -176,7 +175,6 @@ def _value(unknown: Unknown, score: float) -> float:
 
 
 def _run(
-    pool: Parallel,
     choice: ModelChoice,
     effects: Mapping[str, Mapping[str, float]],
     columns: Mapping[str, Array],
@@ -186,12 +184,7 @@ def _run(
     switched = {**choice.effects, **effects}
     model = load_model(choice.name, choice.options, switched)
     rows = np.stack([columns[item.name][:count] for item in model.inputs], axis=1)
-    argument = {
-        "name": choice.name, "options": dict(choice.options), "effects": switched,
-        "version": model.version,
-    }  # fmt: skip
-    parts = pool(delayed(evaluate)(argument, rows[k : k + CHUNK]) for k in range(0, count, CHUNK))
-    table: Array = np.concatenate([outputs for outputs, _ in parts])
+    table = evaluator_of(model, choice.options, switched).evaluate(rows).outputs
     failed = float(np.isnan(table).all(axis=1).mean())
     if failed > MOST_FAILED:
         raise StudyError(f"{100.0 * failed:.0f} % of the runs over the accidents failed")
@@ -220,7 +213,6 @@ def _outcomes(
 
 
 def _change_of(
-    pool: Parallel,
     choice: ModelChoice,
     form: Form,
     draws: _Draws,
@@ -240,7 +232,7 @@ def _change_of(
         columns[f"{form.cause}_{parameter.name}"] = values
     for name, value in form.fixed.items():
         columns[f"{form.cause}_{name}"] = np.full(POOL, value)
-    raw = _run(pool, choice, {form.cause: {}}, columns, PAIRED)
+    raw = _run(choice, {form.cause: {}}, columns, PAIRED)
     changed = _outcomes(model, raw, outputs, draws, PAIRED) - base[:PAIRED]
     if not np.any(np.abs(np.nan_to_num(changed)) > 0.0):
         return None

@@ -11,7 +11,7 @@ from mcstudy.sensitivity.rank_based import rank_first_order
 from mcstudy.studyfile import config
 from mcstudy.studyfile.config import MonteCarloStudy, SobolStudy, parse_study
 from models.protocol import complete_status
-from studies.execution import load_study_model
+from studies.runs import load_study_model
 
 OUTPUT = "hic15"
 LIMIT = 700.0

@@ -30,8 +30,8 @@ from studies.diagnosis.posterior import describe
 from studies.diagnosis.problem import build_problem
 from studies.diagnosis.report import draw, sections_of, subtitle_of
 from studies.diagnosis.simulation import Simulation
-from studies.execution import publish
 from studies.headform_records import keep_first_impacts, note_lines
+from studies.publishing import publish
 
 Array = NDArray[np.float64]
 

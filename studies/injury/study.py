@@ -16,11 +16,12 @@ from mcstudy.injury.functions import RiskFunction, risk_function
 from mcstudy.studyfile import config
 from mcstudy.studyfile.config import InjuryStudy, load_study
 from models.protocol import Model
-from studies.execution import judge_runs, load_study_model, publish
 from studies.injury.analysis import CASES, analyse, outcomes_of
 from studies.injury.cells import Cell, cells_of
 from studies.injury.report import draw, sections_of
 from studies.paired_runs import PreparedCell, cell_folder, cell_runs, run_cells
+from studies.publishing import publish
+from studies.runs import check_failure_rate, load_study_model
 
 
 def run_injury(
@@ -78,7 +79,7 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
         runs = cell_runs(folder, cell.name, study.design.n, model)
         frames.append(runs.assign(scenario=cell.scenario, front=cell.front))
     runs = pd.concat(frames, ignore_index=True)
-    ended, complete = judge_runs(study, model, runs)
+    ended, complete = check_failure_rate(study, model, runs)
     cases = outcomes_of(study, runs[complete], functions)
     folder.write_frame(CASES, cases)
     analysis = ended | analyse(study, model, cases, functions)

@@ -18,8 +18,8 @@ from mcstudy.statistics import Estimate, scale_of, varies
 from mcstudy.studyfile import config
 from mcstudy.studyfile.config import ModelComparison
 from models.protocol import Model, complete_status
-from studies.execution import describe_ends
 from studies.paired_runs import batch_of
+from studies.runs import describe_ends
 
 Array = NDArray[np.float64]
 

@@ -14,10 +14,11 @@ from mcstudy.studyfile import config
 from mcstudy.studyfile.config import ModelComparison, MonteCarloStudy, load_study
 from mcstudy.studyfile.schema import Report
 from models.protocol import Model, Run
-from studies.execution import load_study_model, publish
 from studies.model_comparison.analysis import analyse, published_methods
 from studies.model_comparison.report import draw, sections_of
 from studies.paired_runs import PreparedCell, cell_folder, cell_runs, run_cells
+from studies.publishing import publish
+from studies.runs import load_study_model
 
 NOMINAL = "nominal.json"
 """Outputs and pictures' poses of the nominal run of a model, in its cell."""

@@ -14,9 +14,10 @@ from mcstudy.figures import distributions, relations
 from mcstudy.studyfile import config
 from mcstudy.studyfile.config import MonteCarloStudy, load_study
 from models.protocol import Model, complete_status
-from studies.execution import columns_of, describe_runs, load_study_model, publish, run_rows
 from studies.failure_report import failure_map
 from studies.monte_carlo.report import sections_of
+from studies.publishing import publish
+from studies.runs import columns_of, describe_runs, load_study_model, run_rows
 
 
 def run_monte_carlo(

@@ -14,8 +14,9 @@ from mcstudy.statistics import Estimate
 from mcstudy.studyfile import config
 from mcstudy.studyfile.config import MorrisStudy, load_study
 from models.protocol import Model
-from studies.execution import judge_runs, load_study_model, publish, run_rows, whole_prefix
 from studies.morris.report import draw, sections_of
+from studies.publishing import publish
+from studies.runs import check_failure_rate, complete_blocks, load_study_model, run_rows
 
 
 def run_morris(
@@ -79,7 +80,7 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
     if not isinstance(study, MorrisStudy):
         raise UserError(f"{folder.path}: is not the folder of a Morris study")
     model = load_study_model(study)
-    runs = whole_prefix(folder, model)
+    runs = complete_blocks(folder, model)
     analysis = analyse(study, model, runs)
     subtitle = (
         f"Morris screening by {len(runs):,} runs of the {model.name} model: "
@@ -101,7 +102,7 @@ def analyse(study: MorrisStudy, model: Model, runs: pd.DataFrame) -> dict[str, A
     """
     inputs = list(study.inputs)
     drawn = draw_trajectories(inputs, study.groups, study.design.n, study.design.levels, study.seed)
-    analysis, complete = judge_runs(study, model, runs, drawn.block)
+    analysis, complete = check_failure_rate(study, model, runs, drawn.block)
     names = [item.name for item in model.outputs]
     cube, kept = whole_blocks(runs[names].to_numpy(dtype=float), complete, drawn.block)
     levels = drawn.levels[: len(runs)].reshape(len(cube), drawn.block, -1)

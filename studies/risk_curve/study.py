@@ -16,9 +16,10 @@ from mcstudy.report import Section, Table
 from mcstudy.studyfile.config import InjuryStudy, load_study
 from mcstudy.studyfile.schema import REFERENCE
 from mcstudy.text import interval, number, unit
-from studies.execution import load_study_model, publish
 from studies.injury.analysis import CASES, proportional
 from studies.injury.cells import fronts_of
+from studies.publishing import publish
+from studies.runs import load_study_model
 
 
 def fit_risk_curves(

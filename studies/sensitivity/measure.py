@@ -16,8 +16,9 @@ from mcstudy.statistics import Estimate
 from mcstudy.studyfile import config
 from mcstudy.studyfile.config import MonteCarloStudy, MorrisStudy, SobolStudy, load_study
 from models.protocol import complete_status
-from studies.execution import columns_of, load_study_model, publish
 from studies.main_effects import main_effects_of
+from studies.publishing import publish
+from studies.runs import columns_of, load_study_model
 from studies.sensitivity.report import draw, sections_of
 
 

@@ -18,8 +18,8 @@ from mcstudy.statistics import Estimate
 from mcstudy.studyfile import config
 from mcstudy.studyfile.config import SobolStudy
 from models.protocol import Model
-from studies.execution import judge_runs
 from studies.main_effects import main_effects_of
+from studies.runs import check_failure_rate
 
 Array = NDArray[np.float64]
 
@@ -108,7 +108,7 @@ def _rank(study: SobolStudy, model: Model, runs: pd.DataFrame) -> _Ranked:
     """Return the indices of all outputs that can be given any."""
     factors = factors_of(list(study.inputs), study.groups)
     block = block_size(factors, second_order=study.design.second_order)
-    begun, complete = judge_runs(study, model, runs, block)
+    begun, complete = check_failure_rate(study, model, runs, block)
     names = [item.name for item in model.outputs]
     cube, kept = whole_blocks(runs[names].to_numpy(dtype=float), complete, block)
     scramble = runs["replicate"].to_numpy()[::block]

@@ -10,7 +10,8 @@ from mcstudy.execution.workers import Workers
 from mcstudy.sampling.saltelli import draw_saltelli
 from mcstudy.studyfile import config
 from mcstudy.studyfile.config import SobolStudy, load_study
-from studies.execution import load_study_model, publish, run_rows, whole_prefix
+from studies.publishing import publish
+from studies.runs import complete_blocks, load_study_model, run_rows
 from studies.sobol.analysis import analyse, widest_interval
 from studies.sobol.report import draw, sections_of
 
@@ -92,7 +93,7 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
     if not isinstance(study, SobolStudy):
         raise UserError(f"{folder.path}: is not the folder of a Sobol' study")
     model = load_study_model(study)
-    runs = whole_prefix(folder, model)
+    runs = complete_blocks(folder, model)
     analysis = analyse(study, model, runs)
     subtitle = (
         f"Sobol' study of {len(runs):,} runs of the {model.name} model: "

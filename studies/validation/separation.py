@@ -11,17 +11,18 @@ says nothing about the way on the car, nor that v is the car's speed.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
+from mcstudy.execution.evaluator import Evaluator
+from mcstudy.execution.workers import parallel_backend
 from models.criteria.units import STANDARD_GRAVITY
+from models.protocol import OK, Model, complete_inputs
 from models.registry import load_model
 from models.vehicle.profile import load_vehicle
-from studies.validation.sweep import CHUNK
 
 Array = NDArray[np.float64]
 
@@ -29,6 +30,11 @@ VEHICLE = "family_car_1990s"
 """The car of the model's default."""
 TOUCH = 1.0
 """N of the car's forces on the body above which they are in contact (assumed)."""
+
+
+COLUMNS = ("along", "up", "fall", "way", "friction")
+NO_SEPARATION = "no_separation"
+"""Status of a run that never leaves the car, or lands before it does."""
 
 
 def separations(cases: Sequence[Mapping[str, float]], *, workers: int = -1) -> pd.DataFrame:
@@ -39,45 +45,62 @@ def separations(cases: Sequence[Mapping[str, float]], *, workers: int = -1) -> p
 
     Parameters
     ----------
-    cases : inputs that differ from nominal. workers : processes, -1 for one a core.
+    cases : sequence of mapping
+        Inputs that differ from nominal.
+    workers : int
+        Processes, -1 for one a core.
     """
-    parts = [list(cases[k : k + CHUNK]) for k in range(0, len(cases), CHUNK)]
-    found = Parallel(n_jobs=workers)(delayed(_separate)(part) for part in parts)
-    rows = [row for part in found for row in part]
-    return pd.DataFrame(rows, columns=["along", "up", "fall", "way", "friction"])
-
-
-def _separate(cases: Sequence[Mapping[str, float]]) -> list[tuple[float, ...]]:
     model = load_model("multibody")
+    names = [item.name for item in model.inputs]
+    rows = np.array([[complete_inputs(model, case)[name] for name in names] for case in cases])
+    evaluator = Evaluator(_separate, names, COLUMNS)
+    with parallel_backend(workers):
+        batch = evaluator.evaluate(rows)
+    left = np.array(batch.status) == OK
+    return pd.DataFrame(batch.outputs[left], columns=COLUMNS)
+
+
+def _separate(
+    names: Sequence[str], rows: Array, started: Callable[[int], None]
+) -> tuple[Array, list[str]]:
+    """Return how rows leave the car, and whether they do."""
+    model = load_model("multibody")
+    outputs, status = np.full((len(rows), len(COLUMNS)), np.nan), []
+    for k, row in enumerate(rows.tolist()):
+        started(k)
+        found = _separation(model, dict(zip(names, row, strict=True)))
+        status.append(NO_SEPARATION if found is None else OK)
+        if found is not None:
+            outputs[k] = found
+    return outputs, status
+
+
+def _separation(model: Model, inputs: Mapping[str, float]) -> tuple[float, ...] | None:
+    """Return how a run leaves the car, in the order of ``COLUMNS``, or None."""
     zones = [f"contact_force_{zone.name}" for zone in load_vehicle(VEHICLE).zones]
     centre = [f"centre_of_gravity_{axis}" for axis in "xyz"]
-    rows: list[tuple[float, ...]] = []
-    for case in cases:
-        run = model.observe(case, [*zones, "contact_force_road", *centre])
-        force = run.histories["contact_force"]
-        car = sum(force.channels[name.removeprefix("contact_force_")] for name in zones)
-        touched = np.flatnonzero(np.asarray(car) > TOUCH)
-        place = np.stack([run.histories["centre_of_gravity"].channels[axis] for axis in "xyz"])
-        landed = np.flatnonzero(force.channels["road"] > TOUCH)
-        if not touched.size or not run.end_reason.startswith("rest_on_road"):
-            continue
-        k = int(touched[-1]) + 1
-        first = landed[landed > touched[0]]
-        # Feet may touch the road from the start; what counts is the body's weight on it later.
-        if k + 1 >= place.shape[1] or (first.size and k > first[-1]):
-            continue
-        rate = (place[:, k + 1] - place[:, k]) * _rate(force.time)
-        way = float(np.hypot(*(place[:2, -1] - place[:2, k])))
-        rows.append(
-            (
-                float(np.hypot(rate[0], rate[1])),
-                float(rate[2]),
-                float(place[2, k] - place[2, -1]),
-                way,
-                float(run.inputs["friction_body_road"]),
-            )
-        )
-    return rows
+    run = model.observe(inputs, [*zones, "contact_force_road", *centre])
+    force = run.histories["contact_force"]
+    car = sum(force.channels[name.removeprefix("contact_force_")] for name in zones)
+    touched = np.flatnonzero(np.asarray(car) > TOUCH)
+    place = np.stack([run.histories["centre_of_gravity"].channels[axis] for axis in "xyz"])
+    landed = np.flatnonzero(force.channels["road"] > TOUCH)
+    if not touched.size or not run.end_reason.startswith("rest_on_road"):
+        return None
+    k = int(touched[-1]) + 1
+    first = landed[landed > touched[0]]
+    # Feet may touch the road from the start; what counts is the body's weight on it later.
+    if k + 1 >= place.shape[1] or (first.size and k > first[-1]):
+        return None
+    rate = (place[:, k + 1] - place[:, k]) * _rate(force.time)
+    way = float(np.hypot(*(place[:2, -1] - place[:2, k])))
+    return (
+        float(np.hypot(rate[0], rate[1])),
+        float(rate[2]),
+        float(place[2, k] - place[2, -1]),
+        way,
+        float(run.inputs["friction_body_road"]),
+    )
 
 
 def _rate(time: Array) -> float:

@@ -18,7 +18,7 @@ from mcstudy.errors import StudyError, UserError
 from mcstudy.execution import runner
 from mcstudy.execution.progress import Progress
 from mcstudy.execution.results import ResultsFolder, digest
-from mcstudy.execution.workers import at_work
+from mcstudy.execution.workers import parallel_backend
 
 pytest.importorskip("distributed")
 HERE = Path(__file__).parent
@@ -76,8 +76,8 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
 
 
 def run_there(address: str, folder: ResultsFolder) -> str:
-    with folder.open_for_writing(), at_work(address):
-        found = runner.run(kill_driver.work(), folder, Progress(quiet=True))
+    with folder.open_for_writing(), parallel_backend(address):
+        found = runner.run(kill_driver.work(0.05), folder, Progress(quiet=True))
     np.testing.assert_array_equal(found["run"], np.arange(kill_driver.N))
     return digest(found)
 
@@ -88,10 +88,7 @@ def wait_for_parts(folder: ResultsFolder) -> None:
         time.sleep(0.02)
 
 
-def test_a_lost_worker_costs_no_run_and_changes_no_number(
-    cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(runner, "CHUNK_TIME", 0.05)
+def test_a_lost_worker_costs_no_run_and_changes_no_number(cluster: Cluster, tmp_path: Path) -> None:
     folder = ResultsFolder(tmp_path / "study")
 
     def kill_one() -> None:
@@ -109,7 +106,6 @@ def test_a_lost_worker_costs_no_run_and_changes_no_number(
 def test_a_cluster_without_workers_is_told_and_what_arrived_goes_on(
     cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(runner, "CHUNK_TIME", 0.05)
     monkeypatch.setattr("mcstudy.execution.cluster.GRACE", 1.0)
     folder = ResultsFolder(tmp_path / "study")
 
@@ -133,6 +129,6 @@ def test_a_cluster_without_workers_is_told_and_what_arrived_goes_on(
 def test_no_scheduler_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("mcstudy.execution.cluster.CONNECT_TIME", 1.0)
     for address in ("tcp://127.0.0.1:9", "nonsense", "tcp://"):
-        with pytest.raises(UserError, match="--cluster") as error, at_work(address):
+        with pytest.raises(UserError, match="--cluster") as error, parallel_backend(address):
             pass
         assert "\n" not in str(error.value)

@@ -53,7 +53,8 @@ def fault(kind: int = 0) -> toy_evaluation.Fault:
 
 
 def faulty(evaluate: Any, **more: Any) -> runner.Task:
-    return replace(task(evaluate=evaluate, argument=fault()), **more)
+    work = task(evaluate=evaluate, argument=fault())
+    return replace(work, evaluator=replace(work.evaluator, **more))
 
 
 def check_all_but_one(found: pd.DataFrame, reference: pd.DataFrame, status: str) -> str:
@@ -103,10 +104,9 @@ def test_a_row_that_raises_is_booked_with_its_reason(
 def test_a_number_that_is_none_is_never_ok(
     folder: ResultsFolder, reference: pd.DataFrame, kind: int, status: str, reason: str
 ) -> None:
-    work = replace(
-        task(evaluate=toy_evaluation.evaluate_beyond, argument=fault(kind=kind)),
-        bounds=np.array([[0.0, 2.0], [-np.inf, np.inf]]),
-    )
+    bounds = np.array([[0.0, 2.0], [-np.inf, np.inf]])
+    work = task(evaluate=toy_evaluation.evaluate_beyond, argument=fault(kind=kind))
+    work = replace(work, evaluator=replace(work.evaluator, bounds=bounds))
     assert check_all_but_one(run(work, folder), reference, status) == reason
 
 
@@ -114,7 +114,7 @@ def complete(path: Path) -> pd.DataFrame:
     """Return the whole study after some last quiet runs."""
     folder = ResultsFolder(path)
     with folder.open_for_writing(), joblib.parallel_config(backend="loky", n_jobs=2):
-        found = runner.run(kill_driver.work(), folder, Progress(quiet=True))
+        found = runner.run(kill_driver.work(0.05), folder, Progress(quiet=True))
     np.testing.assert_array_equal(found["run"], np.arange(kill_driver.N))
     assert (found["status"] != "crashed").all()
     return found
@@ -153,10 +153,7 @@ def test_twenty_kills_of_the_driver_lose_nothing(tmp_path: Path, undisturbed: st
     assert digest(complete(path)) == undisturbed
 
 
-def test_ten_kills_of_a_worker_lose_nothing(
-    tmp_path: Path, undisturbed: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(runner, "CHUNK_TIME", 0.05)
+def test_ten_kills_of_a_worker_lose_nothing(tmp_path: Path, undisturbed: str) -> None:
     rng, kills = np.random.default_rng(2), []
     over = threading.Event()
 

@@ -1,6 +1,7 @@
 """The runner: same numbers however it is run, nothing lost that arrived, nothing run twice."""
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from mcstudy.errors import StudyError
 from mcstudy.execution import runner
+from mcstudy.execution.evaluator import Evaluator
 from mcstudy.execution.progress import Progress
 from mcstudy.execution.results import ResultsFolder, digest
 from mcstudy.sampling import designs
@@ -25,11 +27,9 @@ SIZE = 20
 
 def task(n: int = N, evaluate: Any = toy_evaluation.evaluate, argument: Any = None) -> runner.Task:
     return runner.Task(
-        evaluate=evaluate,
-        argument=argument,
+        evaluator=Evaluator(evaluate, argument, toy_evaluation.OUTPUTS),
         inputs=designs.draw("latin-hypercube", n, SIZE, 2, seed=4),
         input_names=toy_evaluation.NAMES,
-        output_names=toy_evaluation.OUTPUTS,
         replicate=np.arange(n) // SIZE,
     )
 
@@ -65,22 +65,14 @@ class Recording:
         self.seen: list[int] = []
         self.calls, self.stop_after, self.error = 0, stop_after, error
 
-    def __call__(self, argument: object, rows: Array) -> tuple[Array, list[str]]:
+    def __call__(
+        self, argument: object, rows: Array, started: toy_evaluation.Started
+    ) -> tuple[Array, list[str]]:
         self.calls += 1
         if self.calls > self.stop_after:
             raise self.error
         self.seen += [self.ids[tuple(row)] for row in rows.tolist()]
         return toy_evaluation.evaluate(argument, rows)
-
-
-class FixedPace:
-    """Chunks of one size, whatever comes back."""
-
-    def __init__(self, size: int) -> None:
-        self.size = size
-
-    def learn(self, result: object) -> None:
-        pass
 
 
 def recorded(n: int = N, **stop: Any) -> tuple[runner.Task, Recording]:
@@ -124,13 +116,38 @@ def test_two_workers_give_the_numbers_of_one(
     assert digest(folder.runs()) == digest(reference)
 
 
-@pytest.mark.parametrize("chunk", [1, 7, 1000])
+@pytest.mark.parametrize(("chunk_time", "fewest", "most"), [(0.0, N, N), (1e9, 2, N // 10)])
 def test_the_size_of_chunks_changes_no_number(
-    folder: ResultsFolder, reference: pd.DataFrame, monkeypatch: pytest.MonkeyPatch, chunk: int
+    folder: ResultsFolder, reference: pd.DataFrame, chunk_time: float, fewest: int, most: int
 ) -> None:
-    monkeypatch.setattr(runner, "_Pace", lambda missing, workers: FixedPace(chunk))
-    assert digest(run(task(), folder)) == digest(reference)
-    assert len(list((folder.path / "parts").iterdir())) == -(-N // chunk)
+    work = task()
+    work = replace(work, evaluator=replace(work.evaluator, chunk_time=chunk_time))
+    assert digest(run(work, folder)) == digest(reference)
+    assert fewest <= len(list((folder.path / "parts").iterdir())) <= most
+
+
+def test_an_evaluator_gives_rows_in_their_order_without_a_folder(reference: pd.DataFrame) -> None:
+    work = task()
+    with joblib.parallel_config(backend="loky", n_jobs=2):
+        batch = work.evaluator.evaluate(work.inputs)
+    np.testing.assert_array_equal(batch.outputs, reference[[*toy_evaluation.OUTPUTS]].to_numpy())
+    assert batch.status == reference["status"].tolist()
+
+
+def test_a_chunk_is_evaluated_whole_and_row_by_row_after_a_failure(reference: pd.DataFrame) -> None:
+    sizes = []
+
+    def evaluate(_argument: object, rows: Array, started: Any) -> tuple[Array, list[str]]:
+        sizes.append(len(rows))
+        if (rows[:, 0] > toy_evaluation.UNSOLVED).any() and len(rows) > 1:
+            raise ValueError("one of them")
+        return toy_evaluation.evaluate(None, rows)
+
+    work = task()
+    with joblib.parallel_config(n_jobs=1):
+        batch = Evaluator(evaluate, None, toy_evaluation.OUTPUTS).evaluate(work.inputs)
+    assert batch.status == reference["status"].tolist()
+    assert max(sizes) > 1 and sizes.count(1) > 1
 
 
 def test_one_worker_gives_no_warning(folder: ResultsFolder) -> None:
@@ -141,9 +158,7 @@ def test_one_worker_gives_no_warning(folder: ResultsFolder) -> None:
 
 def test_one_run_is_a_study_too(folder: ResultsFolder) -> None:
     work = task(SIZE)
-    single = runner.Task(
-        work.evaluate, None, work.inputs[:1], work.input_names, work.output_names, np.array([0])
-    )
+    single = replace(work, inputs=work.inputs[:1], replicate=np.array([0]))
     assert len(run(single, folder)) == 1
 
 

@@ -3,12 +3,20 @@
 import os
 import re
 import time
+from collections.abc import Callable
 from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Started = Callable[[int], None]
+Found = tuple[Array, list[str]]
+
+
+def ignore(_row: int) -> None:
+    """Tell nobody which row begins."""
+
 
 NAMES = ("x", "y")
 OUTPUTS = ("total", "product")
@@ -23,7 +31,7 @@ class Fault(TypedDict):
     kind: int
 
 
-def evaluate(argument: object, rows: Array) -> tuple[Array, list[str]]:
+def evaluate(argument: object, rows: Array, started: Started = ignore) -> Found:
     """Return x + y and x * y; rows with x above ``UNSOLVED`` have no product."""
     unsolved = rows[:, 0] > UNSOLVED
     product = np.where(unsolved, np.nan, rows[:, 0] * rows[:, 1])
@@ -31,7 +39,7 @@ def evaluate(argument: object, rows: Array) -> tuple[Array, list[str]]:
     return np.stack([rows[:, 0] + rows[:, 1], product], axis=1), status.tolist()
 
 
-def evaluate_slowly(argument: float, rows: Array) -> tuple[Array, list[str]]:
+def evaluate_slowly(argument: float, rows: Array, started: Started = ignore) -> Found:
     """Take some time, in s, for every row."""
     time.sleep(argument * len(rows))
     return evaluate(None, rows)
@@ -41,14 +49,14 @@ def _is_faulty(fault: Fault, rows: Array) -> bool:
     return bool((rows[:, 0] == fault["x"]).any())
 
 
-def evaluate_and_die(fault: Fault, rows: Array) -> tuple[Array, list[str]]:
+def evaluate_and_die(fault: Fault, rows: Array, started: Started = ignore) -> Found:
     """End the process at one row, without a word."""
     if _is_faulty(fault, rows):
         os._exit(1)
     return evaluate_slowly(0.002, rows)
 
 
-def evaluate_and_hang(fault: Fault, rows: Array) -> tuple[Array, list[str]]:
+def evaluate_and_hang(fault: Fault, rows: Array, started: Started = ignore) -> Found:
     """Never come back from one row, and let nothing else in the process run either."""
     if _is_faulty(fault, rows):
         # A match that backtracks for ever does so in C, with the interpreter held.
@@ -56,14 +64,14 @@ def evaluate_and_hang(fault: Fault, rows: Array) -> tuple[Array, list[str]]:
     return evaluate_slowly(0.002, rows)
 
 
-def evaluate_and_raise(fault: Fault, rows: Array) -> tuple[Array, list[str]]:
+def evaluate_and_raise(fault: Fault, rows: Array, started: Started = ignore) -> Found:
     """Raise at one row."""
     if _is_faulty(fault, rows):
         raise ValueError("a bug\nof two lines")
     return evaluate(None, rows)
 
 
-def evaluate_beyond(fault: Fault, rows: Array) -> tuple[Array, list[str]]:
+def evaluate_beyond(fault: Fault, rows: Array, started: Started = ignore) -> Found:
     """Give numbers that are none, as if all were well: NaN, infinity, a million."""
     outputs, status = evaluate(None, rows)
     outputs[rows[:, 0] == fault["x"], 0] = {0: np.nan, 1: np.inf, 2: 1e6}[fault["kind"]]

@@ -29,13 +29,13 @@ from models.headform.model import HeadformModel
 from models.registry import load_model
 from studies import api
 from studies import worker as evaluation
-from studies.execution import load_study_model
 from studies.injury import analysis as injury_analysis
 from studies.injury import report as injury_report
 from studies.injury import speed as injury_speed
 from studies.injury import study as injury
 from studies.injury.analysis import analyse, outcomes_of
 from studies.injury.cells import cells_of
+from studies.runs import load_study_model
 
 Array = NDArray[np.float64]
 

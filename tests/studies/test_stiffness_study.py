@@ -22,7 +22,7 @@ from models.registry import load_model
 from scripts import example_tests
 from studies import cli
 from studies.api import rerun, run_case, run_study
-from studies.execution import load_study_model
+from studies.runs import load_study_model
 from studies.stiffness import fit_stiffness_of
 
 EXAMPLE = Path("configs/hood_tests")

@@ -7,15 +7,15 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from mcstudy.execution.progress import follow
 from mcstudy.execution.results import ResultsFolder
+from mcstudy.execution.workers import run_jobs
 from mcstudy.figures.panels import Curve, Panel, draw_panels
 from mcstudy.report import Section, Table
 from mcstudy.statistics import probability
 from mcstudy.text import number, percent
-from studies.execution import publish
+from studies.publishing import publish
 from studies.validation.diagnosis.trial import Outcome, Trial, run_trial
 
 SHARES = {
@@ -102,11 +102,8 @@ def validate_diagnosis(
     # Sorted by seed, so that every kind is there from the start.
     trials.sort(key=lambda t: (t.seed, t.kind, t.force))
     outcomes: list[Outcome] = []
-    with Parallel(n_jobs=workers) as pool:
-        for start in follow(
-            range(0, len(trials), BATCH), f"batches of {BATCH} trials", quiet=quiet
-        ):
-            outcomes += pool(delayed(run_trial)(t) for t in trials[start : start + BATCH])
+    for start in follow(range(0, len(trials), BATCH), f"batches of {BATCH} trials", quiet=quiet):
+        outcomes += run_jobs(run_trial, trials[start : start + BATCH], workers)
     with folder.open_for_writing():
         return publish(
             folder, "Validation of the diagnosis",

@@ -1,9 +1,9 @@
-"""What every sampled study shares: its model, its runs in parallel, its manifest."""
+"""The runs of a study: its model, its evaluations in parallel, its manifest, its table."""
 
 import os
 import platform
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any
 
@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from mcstudy.errors import UserError
 from mcstudy.execution import runner
+from mcstudy.execution.evaluator import Evaluator
 from mcstudy.execution.failures import endings, locate_failures
 from mcstudy.execution.progress import Progress
 from mcstudy.execution.results import ResultsFolder, check_failures, digest, status_counts
-from mcstudy.execution.workers import Workers, at_work
-from mcstudy.figures import style
-from mcstudy.report import Section, render
+from mcstudy.execution.workers import Workers, parallel_backend
 from mcstudy.sensitivity.blocks import FEWEST_BLOCKS
 from mcstudy.studyfile import config
 from mcstudy.studyfile.config import (
@@ -29,9 +28,10 @@ from mcstudy.studyfile.config import (
     MonteCarloStudy,
     SampledStudy,
 )
+from mcstudy.studyfile.schema import RUN_TIME
 from models.protocol import Model, complete_status
 from models.registry import load_model
-from studies import worker as evaluation
+from studies.worker import ModelArgument, evaluate
 
 PACKAGES = ("numpy", "scipy", "numba", "pandas", "joblib", "pyarrow", "salib")
 
@@ -48,6 +48,41 @@ def load_study_model(study: CommonStudy) -> Model:
         return load_model(study.model.name, study.model.options, study.effects)
     except (ValueError, TypeError) as error:
         raise UserError(f"model: {error}") from None
+
+
+def evaluator_of(
+    model: Model,
+    options: Mapping[str, Any],
+    effects: Mapping[str, Mapping[str, float]] | None = None,
+    *,
+    run_time: float = RUN_TIME,
+) -> Evaluator:
+    """Return the evaluator of a model of the registry.
+
+    Parameters
+    ----------
+    model : Model
+        As loaded with the same options and effects.
+    options : mapping
+        Of the model.
+    effects : mapping, optional
+        Switched on, with their parameters.
+    run_time : float
+        s that one run may take.
+    """
+    argument: ModelArgument = {
+        "name": model.name,
+        "options": dict(options),
+        "effects": {name: dict(values) for name, values in (effects or {}).items()},
+        "version": model.version,
+    }
+    return Evaluator(
+        function=evaluate,
+        argument=argument,
+        output_names=[item.name for item in model.outputs],
+        bounds=np.array([[item.low, item.high] for item in model.outputs]),
+        run_time=run_time,
+    )
 
 
 def run_rows(
@@ -78,19 +113,10 @@ def run_rows(
     """
     rows = np.stack([columns[item.name] for item in model.inputs], axis=1)
     task = runner.Task(
-        evaluate=evaluation.evaluate,
-        argument={
-            "name": study.model.name,
-            "options": study.model.options,
-            "effects": study.effects,
-            "version": model.version,
-        },
+        evaluator=evaluator_of(model, study.model.options, study.effects, run_time=study.run_time),
         inputs=rows,
         input_names=[item.name for item in model.inputs],
-        output_names=[item.name for item in model.outputs],
         replicate=replicate,
-        bounds=np.array([[item.low, item.high] for item in model.outputs]),
-        run_time=study.run_time,
     )
     complete = complete_status(model)
     manifest = _manifest(study, model, config.numbers_digest(study, model), design, workers)
@@ -98,7 +124,7 @@ def run_rows(
     manifest["wall_time_s"] = spent.get("wall_time_s", 0.0)
     folder.write_json("manifest.json", manifest)
     start = time.perf_counter()
-    with at_work(workers):
+    with parallel_backend(workers):
         watched = config.report_outputs(study, model)
         progress = Progress(quiet=quiet, complete=complete, watched=watched)
         runs = runner.run(task, folder, progress)
@@ -122,7 +148,7 @@ def columns_of(model: Model) -> list[str]:
     return ["replicate", *names]
 
 
-def whole_prefix(folder: ResultsFolder, model: Model) -> pd.DataFrame:
+def complete_blocks(folder: ResultsFolder, model: Model) -> pd.DataFrame:
     """Return the first runs of a design in blocks, up to the first block with a missing run.
 
     Parameters
@@ -187,7 +213,7 @@ def describe_ends(
     }
 
 
-def judge_runs(
+def check_failure_rate(
     study: FactorStudy | InjuryStudy, model: Model, runs: pd.DataFrame, block: int = 1
 ) -> tuple[dict[str, Any], NDArray[np.bool_]]:
     """Return what ``describe_runs`` does, if the study allows so many failures.
@@ -200,31 +226,6 @@ def judge_runs(
     counts = status_counts(runs)
     check_failures(counts, set(counts) - complete_status(model), study.max_failure_rate)
     return describe_runs(study, model, runs, block)
-
-
-def publish(
-    folder: ResultsFolder,
-    title: str,
-    subtitle: str,
-    analysis: Mapping[str, Any],
-    draw: Callable[[dict[str, Any]], Mapping[str, Any]],
-    sections_of: Callable[[dict[str, Any], Mapping[str, Any]], Sequence[Section]],
-) -> dict[str, Any]:
-    """Write an analysis, its figures and its report, and return the analysis as it is on disk.
-
-    Figures and report are made of what the file holds, so that they can be made of it again.
-
-    Parameters
-    ----------
-    folder : ResultsFolder. title, subtitle : of the report.
-    draw : analysis to figures by file name. sections_of : analysis and figures to sections.
-    """
-    folder.write_json("analysis.json", analysis)
-    held = folder.read_json("analysis.json")
-    figures = draw(held)
-    style.save(figures, folder.path / "figures")
-    folder.write_text("report.html", render(title, subtitle, sections_of(held, figures)))
-    return held
 
 
 def _manifest(

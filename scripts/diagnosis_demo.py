@@ -18,13 +18,14 @@ from mcstudy.figures import risk, style
 from mcstudy.files import read_study_text
 from mcstudy.injury.cases import read_parquet
 from mcstudy.report import Section, Table
-from mcstudy.studyfile.config import InjuryStudy, parse_study
 from mcstudy.text import percent
 from studies.diagnosis import extension, words
 from studies.diagnosis.report import summarise
 from studies.diagnosis.study import diagnose
 from studies.injury.analysis import CASES
-from studies.injury.study import run_injury
+from studies.injury.schema import InjuryStudy
+from studies.injury.study import Injury
+from studies.kinds import parse_study
 from studies.publishing import publish
 from studies.validation.diagnosis.hidden_effects import Hidden, make_tests
 
@@ -66,7 +67,7 @@ def run_demo(
         study = parse_study(content, f"{study_file} ({name})")
         assert isinstance(study, InjuryStudy)
         say(f"injury study, {TITLES[name]}")
-        found = run_injury(study, content, ResultsFolder(out / f"injury_{name}"), workers=workers)
+        found = Injury().run(study, content, ResultsFolder(out / f"injury_{name}"), workers=workers)
         injuries[name] = found["scenarios"]["reference"] | {"limit": study.limit.value}
     folder = ResultsFolder(out)
     with folder.open_for_writing():

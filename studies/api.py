@@ -8,8 +8,7 @@ Examples
 >>> head = rerun(results, run=17).histories["head"]                 # doctest: +SKIP
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,56 +17,16 @@ from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import Workers
 from mcstudy.files import read_study_text
 from mcstudy.report import Table
-from mcstudy.studyfile.config import ModelComparison, Reconstruction, Study, load_study, parse_study
+from mcstudy.studyfile.schema import AnyStudy, CommonStudy
 from models.protocol import Run
-from studies.injury import report as injury_report
-from studies.injury import study as injury
-from studies.model_comparison import report as model_comparison_report
-from studies.model_comparison import study as model_comparison
-from studies.monte_carlo import report as monte_carlo_report
-from studies.monte_carlo import study as monte_carlo
-from studies.morris import report as morris_report
-from studies.morris import study as morris
-from studies.reconstruction import Comparison, reconstruct, write_reconstruction
+from studies.kinds import KINDS, load_study, parse_study
+from studies.published_tables import PublishedTable
+from studies.reconstruction.schema import Reconstruction
+from studies.reconstruction.study import reconstruct, write_reconstruction
 from studies.runs import columns_of, load_study_model
-from studies.sobol import report as sobol_report
-from studies.sobol import study as sobol
 
 
-@dataclass(frozen=True)
-class Pipeline:
-    """A kind of sampled study.
-
-    Attributes
-    ----------
-    run : (study, its text, folder, workers, quiet) to the analysis.
-    build_report : folder to the analysis, without running the model.
-    summarise : analysis to what the command line prints, paragraphs and tables.
-    """
-
-    run: Callable[..., dict[str, Any]]
-    build_report: Callable[[ResultsFolder], dict[str, Any]]
-    summarise: Callable[[Mapping[str, Any]], list[str] | list[Table]]
-
-
-PIPELINES = {
-    "monte-carlo": Pipeline(
-        monte_carlo.run_monte_carlo, monte_carlo.build_report, monte_carlo_report.summarise
-    ),
-    "sobol": Pipeline(sobol.run_sobol, sobol.build_report, sobol_report.summarise),
-    "morris": Pipeline(morris.run_morris, morris.build_report, morris_report.summarise),
-    "injury": Pipeline(injury.run_injury, injury.build_report, injury_report.summarise),
-    "model-comparison": Pipeline(
-        model_comparison.run_comparison,
-        model_comparison.build_report,
-        model_comparison_report.summarise,
-    ),
-}
-"""A new kind of study is its modules, its class in
-``mcstudy.studyfile.schema`` and one line here."""
-
-
-def results_folder(study: Study, out: Path | str | None = None) -> ResultsFolder:
+def results_folder(study: AnyStudy, out: Path | str | None = None) -> ResultsFolder:
     """Return the results folder of a study: ``out`` or ``results/<name>``."""
     return ResultsFolder(Path("results") / study.name if out is None else Path(out))
 
@@ -102,10 +61,10 @@ def run_study(
     """
     text = read_study_text(path)
     study = parse_study(text, str(path))
-    if study.kind not in PIPELINES:
+    if study.kind not in KINDS:
         raise UserError(f"{path}: kind {study.kind!r} is run by 'mcstudy reconstruct'")
     folder = results_folder(study, out)
-    PIPELINES[study.kind].run(study, text, folder, workers=workers, quiet=quiet)
+    KINDS[study.kind].run(study, text, folder, workers=workers, quiet=quiet)
     return folder
 
 
@@ -118,15 +77,16 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
         If the folder holds no study that has runs.
     """
     study = load_study(folder.path / "study.toml")
-    if study.kind not in PIPELINES:
+    if study.kind not in KINDS:
         raise UserError(f"{folder.path}: a {study.kind} is drawn again by 'mcstudy reconstruct'")
-    return PIPELINES[study.kind].build_report(folder)
+    analysis: dict[str, Any] = KINDS[study.kind].build_report(study, folder)
+    return analysis
 
 
 def summarise(folder: ResultsFolder, analysis: Mapping[str, Any]) -> list[str | Table]:
     """Return the analysis of a study's folder in a few paragraphs and tables."""
     kind = load_study(folder.path / "study.toml").kind
-    return [*PIPELINES[kind].summarise(analysis), _counted(analysis)]
+    return [*KINDS[kind].summarise(analysis), _counted(analysis)]
 
 
 def _counted(analysis: Mapping[str, Any]) -> str:
@@ -136,7 +96,7 @@ def _counted(analysis: Mapping[str, Any]) -> str:
 
 def run_case(
     path: Path | str, *, out: Path | str | None = None
-) -> tuple[Run, list[Comparison], ResultsFolder]:
+) -> tuple[Run, list[PublishedTable], ResultsFolder]:
     """Run a reconstruction file and write its folder.
 
     Returns
@@ -170,7 +130,7 @@ def rerun(results: ResultsFolder, run: int) -> Run:
         If the folder has no such run.
     """
     study = load_study(results.path / "study.toml")
-    if isinstance(study, ModelComparison):
+    if not isinstance(study, CommonStudy):
         raise UserError(f"{results.path}: give the folder of one of its models, under cells")
     model = load_study_model(study)
     runs = results.runs(columns_of(model))

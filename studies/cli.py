@@ -79,14 +79,15 @@ def run(
 @app.command()
 def reconstruct(study: Study, out: Out = None, quiet: Quiet = False, as_json: Json = False) -> None:
     """Run one case, print it beside published tables and draw it."""
-    from studies import api, reconstruction
+    from studies import api
+    from studies.published_tables import as_table
 
     case, tables, folder = api.run_case(study, out=out)
     if as_json:
         _print_json(dict(case.outputs) | {"status": case.status})
     elif not quiet:
         for comparison in tables:
-            table = reconstruction.as_table(comparison)
+            table = as_table(comparison)
             print_table(table.caption, table.head, table.rows)
         print_lines([f"ended: {case.end_reason.replace('_', ' ')}"])
         print_path("report", folder.path / "report.html")

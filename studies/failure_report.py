@@ -7,9 +7,6 @@ from mcstudy.figures import style
 from mcstudy.figures.failures import draw_failures
 from mcstudy.report import Table
 
-BLOCKS = {"sobol": "base points", "morris": "trajectories"}
-"""What runs that belong together are called, by kind of study."""
-
 
 def failure_map(analysis: Mapping[str, Any]) -> dict[str, Any]:
     """Return the figure of where runs failed, if any did."""
@@ -17,16 +14,24 @@ def failure_map(analysis: Mapping[str, Any]) -> dict[str, Any]:
     return {"failures": draw_failures(failed["map"])} if failed["runs"] else {}
 
 
-def failures_said(analysis: Mapping[str, Any]) -> list[str]:
-    """Say how many runs failed, and where."""
+def failures_said(analysis: Mapping[str, Any], blocks: str = "") -> list[str]:
+    """Say how many runs failed, and where.
+
+    Parameters
+    ----------
+    analysis : mapping
+        Of a study.
+    blocks : str
+        What its runs that belong together are called, if there are any.
+    """
     failed = analysis["failures"]
     if not failed["runs"]:
         return ["No run failed."]
     lost = (
         f"{failed['runs']:,} of {analysis['runs']:,} runs failed ({100.0 * failed['share']:.2g} %)"
     )
-    if analysis["kind"] in BLOCKS:
-        lost += f", in {failed['blocks']:,} {BLOCKS[analysis['kind']]}, which are left out whole"
+    if blocks:
+        lost += f", in {failed['blocks']:,} {blocks}, which are left out whole"
     lines = [f"{lost}."]
     if failed["where"]:
         words = {"low": "low", "high": "high", "ends": "low or high", "middle": "in the middle"}

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mcstudy import units
 from mcstudy.sensitivity.main_effects import main_effect
-from mcstudy.studyfile.config import SampledStudy
+from mcstudy.studyfile.schema import SampledStudy
 from models.protocol import Model
 
 

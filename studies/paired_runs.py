@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
@@ -12,14 +12,35 @@ from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.progress import say
 from mcstudy.execution.results import ResultsFolder, digest
 from mcstudy.execution.workers import Workers
-from mcstudy.studyfile.config import InjuryStudy, ModelComparison, MonteCarloStudy
+from mcstudy.studyfile.schema import Design
 from models.protocol import Model
+from studies.monte_carlo.schema import MonteCarloStudy
 from studies.runs import columns_of, run_rows
 
 Array = NDArray[np.float64]
 
 BATCHES = 20
 """Parts of an independent sample between which intervals are taken (assumed)."""
+
+
+class PairedStudy(Protocol):
+    """A study whose cells share their draws."""
+
+    @property
+    def name(self) -> str:
+        """Of the study."""
+
+    @property
+    def kind(self) -> str:
+        """Name of the kind."""
+
+    @property
+    def seed(self) -> int:
+        """Of the draws."""
+
+    @property
+    def design(self) -> Design:
+        """Of each cell."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +59,7 @@ def cell_folder(folder: ResultsFolder, name: str) -> ResultsFolder:
 
 
 def run_cells(
-    study: InjuryStudy | ModelComparison,
-    text: str,
+    study: PairedStudy,
     folder: ResultsFolder,
     cells: Sequence[PreparedCell],
     *,
@@ -50,7 +70,8 @@ def run_cells(
 
     Parameters
     ----------
-    study, text : the study and its file as written. folder : open for writing.
+    study : PairedStudy
+    folder : open for writing.
     cells : in the order in which they are run.
     workers : processes, -1 for one a core, or the address of a dask scheduler.
     quiet : no progress line.
@@ -73,7 +94,6 @@ def run_cells(
         },
         "finished": False,
     }
-    folder.write_text("study.toml", text)
     folder.write_json("manifest.json", manifest)
     digests, counts = {}, pd.Series(dtype=int)
     for cell in cells:
@@ -116,7 +136,7 @@ def cell_runs(folder: ResultsFolder, name: str, n: int, model: Model) -> pd.Data
     return runs
 
 
-def batch_of(study: InjuryStudy | ModelComparison, runs: pd.DataFrame) -> NDArray[np.int64]:
+def batch_of(study: PairedStudy, runs: pd.DataFrame) -> NDArray[np.int64]:
     """Return the independent part of the design that each run belongs to, (n,).
 
     Replicates are such parts; of independent runs any are, so they are cut into twenty.

@@ -4,8 +4,9 @@ import os
 import platform
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.metadata import version
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
@@ -19,21 +20,54 @@ from mcstudy.execution.progress import Progress
 from mcstudy.execution.results import ResultsFolder, check_failures, digest, status_counts
 from mcstudy.execution.workers import Workers, parallel_backend
 from mcstudy.sensitivity.blocks import FEWEST_BLOCKS
-from mcstudy.studyfile import config
-from mcstudy.studyfile.config import (
-    CommonStudy,
-    FactorStudy,
-    InjuryStudy,
-    ModelComparison,
-    MonteCarloStudy,
-    SampledStudy,
-)
-from mcstudy.studyfile.schema import RUN_TIME
+from mcstudy.studyfile.identity import hash_of, numbers_digest
+from mcstudy.studyfile.schema import RUN_TIME, CommonStudy, SampledStudy
+from mcstudy.studyfile.study_outputs import report_outputs
 from models.protocol import Model, complete_status
 from models.registry import load_model
-from studies.worker import ModelArgument, evaluate
+from studies import worker
 
 PACKAGES = ("numpy", "scipy", "numba", "pandas", "joblib", "pyarrow", "salib")
+
+
+class DescribedStudy(Protocol):
+    """A study of runs: its kind, the inputs that it samples, the failures that it allows."""
+
+    @property
+    def kind(self) -> str:
+        """Name of the kind."""
+
+    @property
+    def inputs(self) -> Mapping[str, Any]:
+        """Sampled inputs by name."""
+
+    @property
+    def max_failure_rate(self) -> float:
+        """Share of the runs that may fail."""
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """What a study of one model is to run.
+
+    Attributes
+    ----------
+    model : Model
+    columns : (n,) values of every input of the model, by name.
+    replicate : (n,) of each row.
+    """
+
+    model: Model
+    columns: Mapping[str, NDArray[np.float64]]
+    replicate: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class ModelRuns:
+    """The runs of a study of one model: the model and the table."""
+
+    model: Model
+    runs: pd.DataFrame
 
 
 def load_study_model(study: CommonStudy) -> Model:
@@ -70,14 +104,14 @@ def evaluator_of(
     run_time : float
         s that one run may take.
     """
-    argument: ModelArgument = {
+    argument: worker.ModelArgument = {
         "name": model.name,
         "options": dict(options),
         "effects": {name: dict(values) for name, values in (effects or {}).items()},
         "version": model.version,
     }
     return Evaluator(
-        function=evaluate,
+        function=worker.evaluate,
         argument=argument,
         output_names=[item.name for item in model.outputs],
         bounds=np.array([[item.low, item.high] for item in model.outputs]),
@@ -119,13 +153,13 @@ def run_rows(
         replicate=replicate,
     )
     complete = complete_status(model)
-    manifest = _manifest(study, model, config.numbers_digest(study, model), design, workers)
+    manifest = _manifest(study, model, numbers_digest(study, model), design, workers)
     spent = folder.read_json("manifest.json") if (folder.path / "manifest.json").exists() else {}
     manifest["wall_time_s"] = spent.get("wall_time_s", 0.0)
     folder.write_json("manifest.json", manifest)
     start = time.perf_counter()
     with parallel_backend(workers):
-        watched = config.report_outputs(study, model)
+        watched = report_outputs(study, model)
         progress = Progress(quiet=quiet, complete=complete, watched=watched)
         runs = runner.run(task, folder, progress)
     # A study that was larger before keeps its further runs.
@@ -174,7 +208,7 @@ def complete_blocks(folder: ResultsFolder, model: Model) -> pd.DataFrame:
 
 
 def describe_runs(
-    study: MonteCarloStudy | FactorStudy | InjuryStudy,
+    study: DescribedStudy,
     model: Model,
     runs: pd.DataFrame,
     block: int = 1,
@@ -191,7 +225,7 @@ def describe_runs(
 
 
 def describe_ends(
-    study: MonteCarloStudy | FactorStudy | InjuryStudy | ModelComparison,
+    study: DescribedStudy,
     runs: pd.DataFrame,
     complete: NDArray[np.bool_],
     words: frozenset[str],
@@ -214,7 +248,7 @@ def describe_ends(
 
 
 def check_failure_rate(
-    study: FactorStudy | InjuryStudy, model: Model, runs: pd.DataFrame, block: int = 1
+    study: DescribedStudy, model: Model, runs: pd.DataFrame, block: int = 1
 ) -> tuple[dict[str, Any], NDArray[np.bool_]]:
     """Return what ``describe_runs`` does, if the study allows so many failures.
 
@@ -243,7 +277,7 @@ def _manifest(
         "model": {"name": model.name, "version": model.version, "options": study.model.options},
         "design": dict(design),
         "numbers": dict(topics),
-        "hash": config.hash_of(dict(topics)),
+        "hash": hash_of(dict(topics)),
         "versions": {"mcstudy": version("mcstudy"), "python": platform.python_version()}
         | {name: version(name) for name in PACKAGES},
         "machine": {"system": platform.system(), "processor": platform.machine(),

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from mcstudy.diagnosis.layout import Layout, Scatter
 from mcstudy.diagnosis.normal_equations import NormalEquations, Scores
-from mcstudy.diagnosis.problem import FARTHEST, Form, Observation, Problem, value_at
+from mcstudy.diagnosis.problem import Form, Observation, Problem
+from mcstudy.studyfile.input_space import FARTHEST, value_at
 
 Array = NDArray[np.float64]
 
@@ -91,7 +92,7 @@ class _Common:
 def _common(problem: Problem, forms: Sequence[Form], shared: Array) -> _Common:
     count = len(problem.unknowns)
     unknowns = {
-        unknown.name: value_at(unknown.quantile, float(score))
+        unknown.name: value_at(unknown.prior, float(score))
         for unknown, score in zip(problem.unknowns, shared[:count], strict=True)
     }
     effects = {}

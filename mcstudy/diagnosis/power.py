@@ -18,10 +18,10 @@ from mcstudy.diagnosis.problem import (
     Signal,
     Simulate,
     Test,
-    value_at,
 )
 from mcstudy.diagnosis.screening import POWER, score_templates
 from mcstudy.diagnosis.templates import Template, change_of
+from mcstudy.studyfile.input_space import value_at
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def smallest_visible(
                 continue
             template = Template(form, scores, columns)
             information = score_templates(fitted, layouts, [template])[1][0]
-            values.append(value_at(parameter.quantile, float(z)))
+            values.append(value_at(parameter.prior, float(z)))
             strengths.append(float(np.sqrt(information)))
         value = _crossing(np.array(values), np.array(strengths), parameter.none, threshold + POWER)
         found.append(

@@ -4,25 +4,16 @@ All that is uncertain is written in *scores*: standard normal numbers from which
 makes the value. So every prior is the same, and a parameter cannot leave its range.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
+
+from mcstudy.studyfile.input_space import InputSpace, value_at
 
 Array = NDArray[np.float64]
-Quantile = Callable[[float], float]
-"""Probability to value."""
-
-FARTHEST = 8.0
-"""Score beyond which a quantile is not followed."""
-
-
-def value_at(quantile: Quantile, score: float) -> float:
-    """Return the value of a prior at a score."""
-    return float(quantile(float(special.ndtr(min(max(score, -FARTHEST), FARTHEST)))))
 
 
 @dataclass(frozen=True)
@@ -85,10 +76,10 @@ class Test:
 
 @dataclass(frozen=True)
 class Unknown:
-    """An unknown that all tests share: name of the input, quantile of its prior."""
+    """An unknown that all tests share: name of the input, and its prior."""
 
     name: str
-    quantile: Quantile
+    prior: InputSpace
 
 
 @dataclass(frozen=True)
@@ -97,14 +88,16 @@ class Parameter:
 
     Attributes
     ----------
-    name, unit, meaning : of it. quantile : of the prior. none : value at which it does nothing.
+    name, unit, meaning : of it.
+    prior : input space of this parameter alone.
+    none : value at which it does nothing.
     family : of the prior: ``lognormal``, ``normal`` or ``uniform``.
     """
 
     name: str
     unit: str
     meaning: str
-    quantile: Quantile
+    prior: InputSpace
     none: float
     family: str
 
@@ -126,9 +119,7 @@ class Form:
 
     def values(self, scores: Sequence[float] | Array) -> dict[str, float]:
         """Return the parameters by name at scores of the free ones."""
-        free = {
-            p.name: value_at(p.quantile, float(z)) for p, z in zip(self.free, scores, strict=True)
-        }
+        free = {p.name: value_at(p.prior, float(z)) for p, z in zip(self.free, scores, strict=True)}
         return {**self.fixed, **free}
 
 

@@ -30,6 +30,7 @@ from mcstudy.diagnosis.templates import (
     smooth_discrepancy,
 )
 from mcstudy.errors import UserError
+from mcstudy.studyfile.input_space import value_at
 
 SECOND = 6.0
 """Log units of evidence that a second cause must add."""
@@ -112,7 +113,7 @@ def fit_base(problem: Problem) -> tuple[tuple[Layout, ...], Fit]:
     layouts = []
     for test in problem.tests:
         inputs = dict(test.inputs)
-        inputs |= {u.name: float(u.quantile(0.5)) for u in problem.unknowns}
+        inputs |= {u.name: value_at(u.prior, 0.0) for u in problem.unknowns}
         seen = problem.simulate(inputs, {})
         if seen is None:
             raise UserError(f"test {test.name!r}: the model fails at its recorded inputs")

@@ -27,8 +27,8 @@ from mcstudy.errors import UserError
 from mcstudy.files import parse_toml, read_study_text
 from mcstudy.measurement import isomme
 from mcstudy.measurement.sampling_times import regular_times
-from mcstudy.studyfile.config import first_problem
 from mcstudy.studyfile.distributions import Distribution, Unit
+from mcstudy.studyfile.reading import first_problem
 from mcstudy.tables import TextTable, read_csv
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Distributions of inputs and their dependence.
+"""Distributions of inputs.
 
 Every distribution is a table of a study file and knows one thing: its quantile function. A design
 gives independent uniforms; a Gaussian copula makes them dependent; the quantiles turn them into
@@ -6,7 +6,7 @@ values in the file's unit, converted to the model's unit by the caller.
 """
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 import numpy as np
@@ -237,94 +237,3 @@ class GrowthChart(_Truncated):
 Distribution = Annotated[
     Uniform | Triangular | Normal | LogNormal | GrowthChart, Field(discriminator="distribution")
 ]
-
-
-def sampling_order(distributions: Mapping[str, Distribution]) -> list[str]:
-    """Return the inputs so that each comes after those it depends on.
-
-    Raises
-    ------
-    ValueError
-        If an input depends on one that is not sampled, or on itself.
-    """
-    order: list[str] = []
-    waiting = dict(distributions)
-    while waiting:
-        ready = [n for n, d in waiting.items() if all(p in order for p in d.parents)]
-        if not ready:
-            name, distribution = next(iter(waiting.items()))
-            raise ValueError(
-                f"inputs.{name} depends on {', '.join(distribution.parents)}, "
-                "which must be sampled too and not depend on it"
-            )
-        order += ready
-        for name in ready:
-            del waiting[name]
-    return order
-
-
-def copula_factor(names: Sequence[str], correlations: Sequence[tuple[str, str, float]]) -> Array:
-    """Return the Cholesky factor (d, d) of a Gaussian copula.
-
-    Parameters
-    ----------
-    names : d sampled inputs.
-    correlations : triples of two names and the correlation of their normal scores.
-
-    Raises
-    ------
-    ValueError
-        If a name is not sampled, a pair is repeated, or the matrix is not positive definite.
-    """
-    matrix = np.eye(len(names))
-    seen = set()
-    for first, second, value in correlations:
-        for name in (first, second):
-            if name not in names:
-                raise ValueError(f"{name!r} is not a sampled input")
-        pair = frozenset((first, second))
-        if len(pair) == 1 or pair in seen:
-            raise ValueError(f"the pair {first!r}, {second!r} is repeated or of one input")
-        if not -1.0 < value < 1.0:
-            raise ValueError(
-                f"correlation {value:g} of {first!r}, {second!r} is not within -1 and 1"
-            )
-        seen.add(pair)
-        i, j = names.index(first), names.index(second)
-        matrix[i, j] = matrix[j, i] = value
-    try:
-        return np.asarray(np.linalg.cholesky(matrix))
-    except np.linalg.LinAlgError:
-        raise ValueError("the correlations contradict each other (not positive definite)") from None
-
-
-def sample_values(
-    uniforms: Array, distributions: Mapping[str, Distribution], factor: Array
-) -> dict[str, Array]:
-    """Return values in the file's units for independent uniforms.
-
-    Parameters
-    ----------
-    uniforms : (n, d) in (0, 1), columns in the order of ``distributions``.
-    distributions : d inputs by name.
-    factor : (d, d) from ``copula_factor``.
-
-    Raises
-    ------
-    ValueError
-        Naming the input whose values cannot be drawn.
-    """
-    scores = special.ndtri(np.clip(uniforms, 1e-15, 1.0 - 1e-15))
-    dependent = special.ndtr(scores @ factor.T)
-    # Where nothing is correlated keep the uniforms to the last bit.
-    columns = {
-        name: uniforms[:, k] if np.count_nonzero(factor[k]) == 1 else dependent[:, k]
-        for k, name in enumerate(distributions)
-    }
-    values: dict[str, Array] = {}
-    for name in sampling_order(distributions):
-        try:
-            values[name] = distributions[name].quantile(columns[name], values)
-        except ValueError as error:
-            raise ValueError(f"inputs.{name}: {error}") from None
-    return values

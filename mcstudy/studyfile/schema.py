@@ -1,7 +1,7 @@
-"""What a study file may hold: one class a table, one class a kind of study."""
+"""What study files of several kinds may hold: one class a table."""
 
 import re
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     BaseModel,
@@ -15,7 +15,6 @@ from pydantic import (
 
 from mcstudy.sampling import designs
 from mcstudy.sampling.factors import DUMMY
-from mcstudy.sensitivity.blocks import FEWEST_BLOCKS
 from mcstudy.studyfile.distributions import Distribution, Unit
 
 LARGEST_DESIGN = 10_000_000
@@ -33,7 +32,8 @@ class StudyTable(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
-def _check_folder_name(name: str, place: str = "") -> None:
+def check_folder_name(name: str, place: str = "") -> None:
+    """Raise ``ValueError`` if a name, which stands at a place of the file, can name no folder."""
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,79}", name) or ".." in name:
         raise ValueError(
             f"{place}name {name!r} must be letters, digits, '_', '-' or '.', as it names a folder"
@@ -108,9 +108,10 @@ class Report(StudyTable):
 
 
 class AnyStudy(StudyTable):
-    """What every kind of study has."""
+    """What every kind of study has; each has a ``kind`` that names it."""
 
     format: Literal["mcstudy-study/1"]
+    kind: str
     name: str
     title: str
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 0
@@ -118,7 +119,7 @@ class AnyStudy(StudyTable):
 
     @model_validator(mode="after")
     def _plain_name(self) -> "AnyStudy":
-        _check_folder_name(self.name)
+        check_folder_name(self.name)
         return self
 
 
@@ -134,16 +135,6 @@ class Limits(StudyTable):
 
     max_failure_rate: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
     run_time: Annotated[FiniteFloat, Field(ge=0.01, le=1e6)] = RUN_TIME
-
-
-class MonteCarloStudy(CommonStudy, Limits):
-    """``kind = "monte-carlo"``: sample inputs, run, describe the outputs."""
-
-    kind: Literal["monte-carlo"]
-    design: Design = Design()
-    inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
-    dependence: Dependence = Dependence()
-    report: Report = Report()
 
 
 STRIP_TIMES = [0.0, 0.02, 0.04, 0.06, 0.08]
@@ -166,20 +157,25 @@ class ComparisonTable(StudyTable):
     rows: list[ComparisonRow]
 
 
-class Reconstruction(CommonStudy):
-    """``kind = "reconstruction"``: one nominal run, printed and drawn."""
+class SampledStudy(CommonStudy, Limits):
+    """What kinds of study have that sample the inputs of one model into one table of runs."""
 
-    kind: Literal["reconstruction"]
-    tables: list[ComparisonTable] = []
-    strip_times: Annotated[list[FiniteFloat], Field(min_length=1)] = STRIP_TIMES
-
-
-class FactorStudy(CommonStudy, Limits):
-    """What kinds of study have that exchange one factor, an input or a group, after the other."""
-
-    kind: str
     inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
     dependence: Dependence = Dependence()
+
+    @property
+    def reported(self) -> list[str] | None:
+        """Outputs that the study names for its report, if it names any."""
+        raise NotImplementedError
+
+    def design_topics(self) -> dict[str, Any]:
+        """Return what of the design changes the numbers of a run, by topic."""
+        raise NotImplementedError
+
+
+class FactorStudy(SampledStudy):
+    """What kinds of study have that exchange one factor, an input or a group, after the other."""
+
     groups: dict[str, Annotated[list[str], Field(min_length=1)]] = {}
 
     @model_validator(mode="after")
@@ -201,180 +197,16 @@ class FactorStudy(CommonStudy, Limits):
                 seen[name] = group
         return self
 
+    def design_topics(self) -> dict[str, Any]:
+        """Return what of the design changes the numbers of a run, by topic."""
+        return {
+            "kind": self.kind,
+            "groups": {group: sorted(names) for group, names in self.groups.items()},
+        }
+
 
 class FactorReport(StudyTable):
     """``[report]`` of such a study: outputs to rank, resamples of the intervals."""
 
     outputs: Annotated[list[str], Field(min_length=1)] | None = None
     resamples: Annotated[int, Field(ge=100, le=100_000)] = 1000
-
-
-class SaltelliDesign(StudyTable):
-    """``[design]`` of a Sobol' study: base points, doubled until the indices are known."""
-
-    n: Annotated[int, Field(ge=64, le=2**20)] = 1024
-    start: Annotated[int, Field(ge=64, le=2**20)] = 128
-    tolerance: Annotated[FiniteFloat, Field(gt=0.0)] | None = None
-    second_order: bool = False
-
-    @model_validator(mode="after")
-    def _powers(self) -> "SaltelliDesign":
-        for name in ("n", "start"):
-            value = getattr(self, name)
-            if value & (value - 1):
-                raise ValueError(f"{name} ({value}) must be a power of two")
-        return self
-
-
-class SobolStudy(FactorStudy):
-    """``kind = "sobol"``: how much of the variance of each output each factor explains."""
-
-    kind: Literal["sobol"]
-    design: SaltelliDesign = SaltelliDesign()
-    report: FactorReport = FactorReport()
-
-
-class MorrisDesign(StudyTable):
-    """``[design]`` of a Morris study: trajectories and levels of the grid."""
-
-    n: Annotated[int, Field(ge=FEWEST_BLOCKS, le=100_000)] = 50
-    levels: Annotated[int, Field(ge=4, le=20)] = 4
-
-    @model_validator(mode="after")
-    def _even(self) -> "MorrisDesign":
-        if self.levels % 2:
-            raise ValueError(f"levels ({self.levels}) must be even, or the grid is biased")
-        return self
-
-
-class MorrisStudy(FactorStudy):
-    """``kind = "morris"``: which of many factors matter at all."""
-
-    kind: Literal["morris"]
-    design: MorrisDesign = MorrisDesign()
-    report: FactorReport = FactorReport()
-
-
-class MechanismChoice(StudyTable):
-    """``[mechanisms.<name>]``: risk functions between which nobody can choose, with weights."""
-
-    functions: Annotated[dict[str, Annotated[FiniteFloat, Field(gt=0.0)]], Field(min_length=1)]
-
-
-class Front(StudyTable):
-    """``[fronts.<name>]``: a car front, the share of impacts that it has, its model options."""
-
-    share: Annotated[FiniteFloat, Field(gt=0.0)] = 1.0
-    options: Options = {}
-
-
-class Scenario(StudyTable):
-    """``[scenarios.<name>]``: what is changed against the study as it stands."""
-
-    title: Annotated[str, Field(min_length=1)]
-    inputs: dict[str, Distribution] = {}
-    fixed: dict[str, Value] = {}
-
-
-class ObservedInjury(StudyTable):
-    """``[[observed]]``: an injury of the real case."""
-
-    label: Annotated[str, Field(min_length=1)]
-    mechanism: str
-    level: Annotated[int, Field(ge=1, le=6)]
-
-
-class Limit(StudyTable):
-    """``[limit]``: a limit of an output that is judged as a classifier of injury."""
-
-    output: str = "hic15"
-    value: FiniteFloat = 700.0
-    level: Annotated[int, Field(ge=1, le=6)] = 3
-
-
-REFERENCE, AS_IT_STANDS = "reference", "as it stands"
-"""Name and title of the scenario of an injury study that changes nothing."""
-HEAD = "head"
-"""All mechanisms of injury together."""
-
-
-class InjuryStudy(CommonStudy, Limits):
-    """``kind = "injury"``: from runs to AIS outcomes, for scenarios and car fronts."""
-
-    kind: Literal["injury"]
-    design: Design = Design()
-    inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
-    dependence: Dependence = Dependence()
-    age: Annotated[FiniteFloat, Field(gt=0.0, lt=130.0)] | None = None
-    mechanisms: Annotated[dict[str, MechanismChoice], Field(min_length=1)]
-    together: Literal["dependent", "independent"] = "dependent"
-    fronts: dict[str, Front] = {}
-    scenarios: dict[str, Scenario] = {}
-    observed: list[ObservedInjury] = []
-    limit: Limit = Limit()
-
-    @model_validator(mode="after")
-    def _consistent(self) -> "InjuryStudy":
-        for table, names in (("fronts", [*self.fronts]), ("scenarios", [*self.scenarios])):
-            for name in names:
-                _check_folder_name(name, f"{table}: ")
-        if HEAD in self.mechanisms:
-            raise ValueError(f"mechanisms.{HEAD}: this name is that of all mechanisms together")
-        titles = [AS_IT_STANDS, *(s.title for s in self.scenarios.values())]
-        for title in titles:
-            if titles.count(title) > 1:
-                raise ValueError(f"scenarios: two have the title {title!r}")
-        if REFERENCE in self.scenarios:
-            raise ValueError(f"scenarios.{REFERENCE}: this name is the study's as it stands")
-        for name, scenario in self.scenarios.items():
-            for key in scenario.fixed:
-                if key in scenario.inputs:
-                    raise ValueError(f"scenarios.{name}: {key} is both sampled and fixed")
-                children = [k for k, entry in self.inputs.items() if key in entry.parents]
-                if children:
-                    raise ValueError(
-                        f"scenarios.{name}.fixed.{key}: {children[0]} depends on it; give it a "
-                        f"narrow distribution in scenarios.{name}.inputs.{key} instead"
-                    )
-            for key in scenario.inputs:
-                if key not in self.inputs:
-                    raise ValueError(
-                        f"scenarios.{name}.inputs.{key}: only inputs that the study samples can "
-                        "be sampled otherwise; use fixed"
-                    )
-        for k, entry in enumerate(self.observed):
-            if entry.mechanism not in self.mechanisms:
-                raise ValueError(
-                    f"observed[{k}]: there is no mechanism {entry.mechanism!r}, only "
-                    f"{', '.join(self.mechanisms)}"
-                )
-        return self
-
-
-class ComparisonReport(StudyTable):
-    """``[report]`` of a comparison: outputs to compare, times at which nominal runs are drawn."""
-
-    outputs: Annotated[list[str], Field(min_length=1)] | None = None
-    strip_times: Annotated[list[FiniteFloat], Field(min_length=1)] = STRIP_TIMES
-
-
-class ModelComparison(AnyStudy, Limits):
-    """``kind = "model-comparison"``: the same inputs through two or more models."""
-
-    kind: Literal["model-comparison"]
-    models: Annotated[dict[str, ModelChoice], Field(min_length=2)]
-    design: Design = Design()
-    inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
-    dependence: Dependence = Dependence()
-    report: ComparisonReport = ComparisonReport()
-    tables: list[ComparisonTable] = []
-
-    @model_validator(mode="after")
-    def _plain_labels(self) -> "ModelComparison":
-        for label in self.models:
-            _check_folder_name(label, "models: ")
-        return self
-
-
-Study = MonteCarloStudy | Reconstruction | SobolStudy | MorrisStudy | InjuryStudy | ModelComparison
-SampledStudy = MonteCarloStudy | SobolStudy | MorrisStudy

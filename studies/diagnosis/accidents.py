@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.problem import Cause, Form, Problem, Scalar, Test, Unknown, value_at
+from mcstudy.diagnosis.problem import Cause, Form, Problem, Scalar, Test, Unknown
 from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.progress import follow
 from mcstudy.execution.workers import parallel_backend
@@ -21,8 +21,8 @@ from mcstudy.injury.ais import Mechanism, draw_ais, mix
 from mcstudy.injury.functions import risk_function
 from mcstudy.measurement.measured_data import HEADER, Measured
 from mcstudy.sampling import seeds
-from mcstudy.studyfile import config
-from mcstudy.studyfile.config import MonteCarloStudy
+from mcstudy.studyfile.input_space import value_at
+from mcstudy.studyfile.study_inputs import map_inputs
 from models.protocol import Model
 from models.registry import load_model
 from studies.diagnosis.emulator import (
@@ -34,6 +34,7 @@ from studies.diagnosis.emulator import (
     quadratic_terms,
 )
 from studies.diagnosis.model_choice import ModelChoice
+from studies.monte_carlo.schema import MonteCarloStudy
 from studies.runs import evaluator_of
 
 Array = NDArray[np.float64]
@@ -156,7 +157,7 @@ def _draw(problem: Problem, choice: ModelChoice, model: Model, seed: int) -> _Dr
     study = choice.study
     if isinstance(study, MonteCarloStudy):
         recorded = {*tests[0].inputs, *(u.name for u in problem.unknowns)}
-        sampled = config.map_inputs(study, model, rng.random((POOL, len(study.inputs))))
+        sampled = map_inputs(study, model, rng.random((POOL, len(study.inputs))))
         columns |= {name: values for name, values in sampled.items() if name not in recorded}
     rows = rng.permutation(np.arange(POOL) % len(tests))
     for name in tests[0].inputs:
@@ -171,7 +172,7 @@ def _draw(problem: Problem, choice: ModelChoice, model: Model, seed: int) -> _Dr
 
 
 def _value(unknown: Unknown, score: float) -> float:
-    return value_at(unknown.quantile, float(score))
+    return value_at(unknown.prior, float(score))
 
 
 def _run(
@@ -227,8 +228,8 @@ def _change_of(
     scores = rng.uniform(-FARTHEST, FARTHEST, (PAIRED, len(form.free)))
     columns = dict(draws.columns)
     for k, parameter in enumerate(form.free):
-        values = np.full(POOL, value_at(parameter.quantile, 0.0))
-        values[:PAIRED] = [value_at(parameter.quantile, float(z)) for z in scores[:, k]]
+        values = np.full(POOL, value_at(parameter.prior, 0.0))
+        values[:PAIRED] = [value_at(parameter.prior, float(z)) for z in scores[:, k]]
         columns[f"{form.cause}_{parameter.name}"] = values
     for name, value in form.fixed.items():
         columns[f"{form.cause}_{name}"] = np.full(POOL, value)
@@ -237,7 +238,7 @@ def _change_of(
     if not np.any(np.abs(np.nan_to_num(changed)) > 0.0):
         return None
     centred = all(
-        np.isclose(value_at(p.quantile, 0.0), p.none, rtol=1e-9, atol=1e-12) for p in form.free
+        np.isclose(value_at(p.prior, 0.0), p.none, rtol=1e-9, atol=1e-12) for p in form.free
     )
     terms = change_terms(scores, points[:PAIRED], centred=centred)
     coefficients, _ = fit_terms(terms, changed)

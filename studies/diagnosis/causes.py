@@ -1,8 +1,18 @@
 """The catalogue of effects as causes of a diagnosis."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
 from mcstudy.diagnosis.problem import Cause, Form, Parameter
-from models.effects.effect import Effect
+from mcstudy.studyfile.input_space import InputSpace
+from models.effects.effect import Effect, Prior
 from models.effects.registry import effects_of, load_effect
+from models.protocol import Input
+
+Array = NDArray[np.float64]
 
 
 def causes_of(model: str) -> tuple[Cause, ...]:
@@ -39,8 +49,27 @@ def _cause(effect: Effect) -> Cause:
 def _parameter(effect: Effect, name: str) -> Parameter:
     entry = effect.parameters[name]
     item = entry.input
+    prior = InputSpace({name: EffectPrior(entry.prior, item)}, {name: item.unit})
+    return Parameter(name, item.unit, item.meaning, prior, entry.none, entry.prior.distribution)
 
-    def quantile(probability: float) -> float:
-        return min(max(float(entry.prior.quantile(probability)), item.low), item.high)
 
-    return Parameter(name, item.unit, item.meaning, quantile, entry.none, entry.prior.distribution)
+@dataclass(frozen=True)
+class EffectPrior:
+    """The prior of an effect's parameter, held within the range of its input."""
+
+    prior: Prior
+    input: Input
+
+    @property
+    def unit(self) -> str:
+        """Of its values."""
+        return self.input.unit
+
+    @property
+    def parents(self) -> tuple[str, ...]:
+        """None: it depends on no other input."""
+        return ()
+
+    def quantile(self, u: Array, given: Mapping[str, Array]) -> Array:
+        """Return the values at probabilities ``u``."""
+        return np.clip(self.prior.quantile(u), self.input.low, self.input.high)

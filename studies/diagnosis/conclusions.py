@@ -8,10 +8,12 @@ import numpy as np
 from mcstudy import statistics
 from mcstudy.sampling import designs, seeds
 from mcstudy.sensitivity.rank_based import rank_first_order
-from mcstudy.studyfile import config
-from mcstudy.studyfile.config import MonteCarloStudy, SobolStudy, parse_study
+from mcstudy.studyfile.study_inputs import map_inputs
 from models.protocol import complete_status
+from studies.kinds import parse_study
+from studies.monte_carlo.schema import MonteCarloStudy
 from studies.runs import load_study_model
+from studies.sobol.schema import SobolStudy
 
 OUTPUT = "hic15"
 LIMIT = 700.0
@@ -39,7 +41,7 @@ def conclude(text: str) -> Conclusions | None:
     model = load_study_model(study)
     n = RUNS[model.name]
     uniforms = designs.draw("latin-hypercube", n, REPLICATE, len(study.inputs), study.seed)
-    columns = config.map_inputs(study, model, uniforms)
+    columns = map_inputs(study, model, uniforms)
     rows = np.stack([columns[item.name] for item in model.inputs], axis=1)
     batch = model.run_batch(rows)
     column = [item.name for item in model.outputs].index(OUTPUT)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.problem import Form, Observation, value_at
+from mcstudy.diagnosis.problem import Form, Observation
+from mcstudy.studyfile.input_space import value_at
 
 Array = NDArray[np.float64]
 
@@ -50,7 +51,7 @@ class Change:
     def _grids(self) -> dict[str, Array]:
         """Values of the free parameters on ``GRID``."""
         return {
-            p.name: np.array([value_at(p.quantile, float(z)) for z in GRID]) for p in self.form.free
+            p.name: np.array([value_at(p.prior, float(z)) for z in GRID]) for p in self.form.free
         }
 
     def scores(self, parameters: Mapping[str, float]) -> Array:

@@ -8,9 +8,12 @@ import numpy as np
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.measurement.measured_data import Measured
 from mcstudy.statistics import REACH
-from mcstudy.studyfile.config import InjuryStudy, MonteCarloStudy, SobolStudy, parse_study
 from models.registry import load_model
 from studies.diagnosis.model_choice import ModelChoice
+from studies.injury.schema import InjuryStudy
+from studies.kinds import parse_study
+from studies.monte_carlo.schema import MonteCarloStudy
+from studies.sobol.schema import SobolStudy
 
 RUNS, REPLICATE = 1000, 100
 """Runs of a study file that is made from data alone."""

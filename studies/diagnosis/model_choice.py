@@ -8,10 +8,11 @@ from typing import Any
 from mcstudy.errors import UserError
 from mcstudy.files import read_study_text
 from mcstudy.measurement.measured_data import HEADER, Measured
-from mcstudy.studyfile import config
-from mcstudy.studyfile.config import CommonStudy, ModelComparison, SampledStudy, parse_study
 from mcstudy.studyfile.distributions import Distribution
+from mcstudy.studyfile.schema import CommonStudy, SampledStudy
+from mcstudy.studyfile.study_inputs import fixed_values
 from models.registry import load_model, model_names
+from studies.kinds import parse_study
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ def choose_model(data: Measured, file: Path | None) -> ModelChoice:
     if file is not None:
         text = read_study_text(file)
         chosen = parse_study(text, str(file))
-        if isinstance(chosen, ModelComparison):
+        if not isinstance(chosen, CommonStudy):
             raise UserError(f"{file}: a model-comparison has several models; give a study of one")
         study = chosen
         if study.model.name != header.model:
@@ -79,7 +80,7 @@ def choose_model(data: Measured, file: Path | None) -> ModelChoice:
     except (ValueError, TypeError) as error:
         raise UserError(f"{file or place}: model: {error}") from None
     if study is not None:
-        fixed |= config.fixed_values(study, model)
+        fixed |= fixed_values(study.fixed, model)
     known = {item.name: item for item in model.inputs}
     for name, value in header.fixed.items():
         if isinstance(value, list):

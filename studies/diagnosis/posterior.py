@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 from mcstudy.diagnosis.fit import Fit
-from mcstudy.diagnosis.problem import Problem, value_at
+from mcstudy.diagnosis.problem import Problem
 from mcstudy.statistics import REACH, Estimate
+from mcstudy.studyfile.input_space import value_at
 
 
 def describe(problem: Problem, fitted: Fit) -> dict[str, list[dict[str, Any]]]:
@@ -23,7 +24,7 @@ def describe(problem: Problem, fitted: Fit) -> dict[str, list[dict[str, Any]]]:
             centre = float(fitted.scores.shared[k])
             reach = REACH * float(np.sqrt(fitted.covariance[k, k]))
             value, *ends = (
-                value_at(parameter.quantile, z) for z in (centre, centre - reach, centre + reach)
+                value_at(parameter.prior, z) for z in (centre, centre - reach, centre + reach)
             )
             rows.append(
                 {

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +10,11 @@ from numpy.typing import NDArray
 from mcstudy import units
 from mcstudy.diagnosis.channels import computed_channels
 from mcstudy.diagnosis.noise import estimate_noise
-from mcstudy.diagnosis.problem import Problem, Quantile, Scalar, Signal, Test, Unknown
+from mcstudy.diagnosis.problem import Problem, Scalar, Signal, Test, Unknown
 from mcstudy.errors import UserError
 from mcstudy.measurement.measured_data import HEADER, Measured
 from mcstudy.studyfile.distributions import Distribution
+from mcstudy.studyfile.input_space import InputSpace
 from models.criteria.filters import settling_time
 from models.criteria.units import STANDARD_GRAVITY
 from models.protocol import Model
@@ -71,7 +71,7 @@ def build_problem(data: Measured, choice: ModelChoice, simulation: Simulation) -
     return Problem(
         tests=tests,
         unknowns=tuple(
-            Unknown(name, _quantile_of(place, name, distribution, inputs[name].unit))
+            Unknown(name, _prior_of(place, name, distribution, inputs[name].unit))
             for name, distribution in choice.uncertain.items()
         ),
         simulate=simulation,
@@ -79,18 +79,13 @@ def build_problem(data: Measured, choice: ModelChoice, simulation: Simulation) -
     )
 
 
-def _quantile_of(place: Path, name: str, distribution: Distribution, unit: str) -> Quantile:
+def _prior_of(place: Path, name: str, distribution: Distribution, unit: str) -> InputSpace:
     if distribution.parents:
         raise UserError(f"{place}: uncertain.{name} may not depend on another input")
     try:
-        scale = units.factor(distribution.unit, unit)
+        return InputSpace({name: distribution}, {name: unit})
     except ValueError as error:
         raise UserError(f"{place}: uncertain.{name}.unit: {error}") from None
-    return partial(_quantile, distribution, scale)
-
-
-def _quantile(distribution: Distribution, scale: float, probability: float) -> float:
-    return scale * float(distribution.quantile(np.array([probability]), {})[0])
 
 
 @dataclass(frozen=True)

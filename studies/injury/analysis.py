@@ -14,10 +14,9 @@ from mcstudy.injury.classifier import judge_limit, receiver_operating_characteri
 from mcstudy.injury.functions import RiskFunction
 from mcstudy.sampling import seeds
 from mcstudy.statistics import Estimate, between_replicates, varies
-from mcstudy.studyfile.config import InjuryStudy
-from mcstudy.studyfile.schema import AS_IT_STANDS, HEAD, REFERENCE
 from models.protocol import Model
 from studies.injury.cells import fronts_of
+from studies.injury.schema import AS_IT_STANDS, HEAD, REFERENCE, InjuryStudy
 from studies.injury.speed import describe_speed
 from studies.paired_runs import BATCHES, batch_of
 

@@ -3,8 +3,9 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mcstudy.studyfile.config import InjuryStudy, MonteCarloStudy
-from mcstudy.studyfile.schema import AS_IT_STANDS, REFERENCE, Front, Report, Scenario
+from mcstudy.studyfile.schema import Report
+from studies.injury.schema import AS_IT_STANDS, REFERENCE, Front, InjuryStudy, Scenario
+from studies.monte_carlo.schema import MonteCarloStudy
 
 
 @dataclass(frozen=True)

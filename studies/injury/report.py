@@ -9,11 +9,10 @@ import pandas as pd
 from mcstudy.figures import risk, style
 from mcstudy.injury.functions import RiskFunction, speed_curves
 from mcstudy.report import Section, Table
-from mcstudy.studyfile.config import InjuryStudy
-from mcstudy.studyfile.schema import REFERENCE
 from mcstudy.text import capital, interval, number, percent
 from studies.failure_report import failure_map, failures_said, status_table
 from studies.injury.analysis import ages_of, proportional
+from studies.injury.schema import REFERENCE, InjuryStudy
 
 FEW = 1000.0
 """Impacts that counts of injured are given for."""

@@ -10,8 +10,7 @@ from scipy import optimize
 
 from mcstudy.figures.style import words
 from mcstudy.sampling import seeds
-from mcstudy.studyfile.config import InjuryStudy
-from mcstudy.studyfile.schema import REFERENCE
+from studies.injury.schema import REFERENCE, InjuryStudy
 from studies.paired_runs import batch_of
 
 Array = NDArray[np.float64]

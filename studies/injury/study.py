@@ -4,6 +4,8 @@ Every scenario meets every car front in a *cell*: the same draws of everything t
 does not change, so that differences between scenarios are sharp. Cells lie in folders of their own.
 """
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,86 +15,108 @@ from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import Workers
 from mcstudy.injury.functions import RiskFunction, risk_function
-from mcstudy.studyfile import config
-from mcstudy.studyfile.config import InjuryStudy, load_study
+from mcstudy.report import Section
+from mcstudy.studyfile.identity import numbers_digest
+from mcstudy.studyfile.study_inputs import fixed_values
+from mcstudy.studyfile.study_outputs import check_outputs
 from models.protocol import Model
 from studies.injury.analysis import CASES, analyse, outcomes_of
 from studies.injury.cells import Cell, cells_of
-from studies.injury.report import draw, sections_of
+from studies.injury.report import draw, sections_of, summarise
+from studies.injury.schema import InjuryStudy
+from studies.kind import StudyKind
+from studies.monte_carlo.design import sample_inputs
 from studies.paired_runs import PreparedCell, cell_folder, cell_runs, run_cells
-from studies.publishing import publish
 from studies.runs import check_failure_rate, load_study_model
 
 
-def run_injury(
-    study: InjuryStudy,
-    text: str,
-    folder: ResultsFolder,
-    *,
-    workers: Workers = -1,
-    quiet: bool = False,
-) -> dict[str, Any]:
-    """Run all cells of a study, or go on with them, and write its results folder.
+@dataclass(frozen=True)
+class InjuryResults:
+    """What the analysis of an injury study takes.
 
-    Parameters
+    Attributes
     ----------
-    study : InjuryStudy
-    text : the study file as written. folder : ResultsFolder
-    workers : processes, -1 for one a core, or the address of a dask scheduler.
-    quiet : no progress line.
-
-    Returns
-    -------
-    dict
-        The analysis, as in ``analysis.json``.
-
-    Raises
-    ------
-    UserError
-        If the study does not fit the model or the folder.
-    StudyError
-        If too many runs failed.
+    model : Model
+    functions : risk functions by name.
+    cases : complete runs of all cells, with risks and a drawn AIS.
+    ended : how the runs ended.
     """
-    prepared = [_prepare(study, cell, folder) for cell in cells_of(study)]
-    with folder.open_for_writing():
-        run_cells(study, text, folder, prepared, workers=workers, quiet=quiet)
-        return build_report(folder)
+
+    model: Model
+    functions: dict[str, RiskFunction]
+    cases: pd.DataFrame
+    ended: dict[str, Any]
 
 
-def build_report(folder: ResultsFolder) -> dict[str, Any]:
-    """Analyse a results folder and write its figures and report, without running the model.
+class Injury(StudyKind[InjuryStudy, list[PreparedCell], InjuryResults]):
+    """Scenarios and car fronts through one model, runs mapped to AIS outcomes."""
 
-    Raises
-    ------
-    UserError
-        If the folder is not one of a finished injury study.
-    StudyError
-        If too many runs failed.
-    """
-    study = load_study(folder.path / "study.toml")
-    if not isinstance(study, InjuryStudy):
-        raise UserError(f"{folder.path}: is not the folder of an injury study")
-    model = load_study_model(study)
-    functions = check_functions(study, model)
-    frames = []
-    for cell in cells_of(study):
-        runs = cell_runs(folder, cell.name, study.design.n, model)
-        frames.append(runs.assign(scenario=cell.scenario, front=cell.front))
-    runs = pd.concat(frames, ignore_index=True)
-    ended, complete = check_failure_rate(study, model, runs)
-    cases = outcomes_of(study, runs[complete], functions)
-    folder.write_frame(CASES, cases)
-    analysis = ended | analyse(study, model, cases, functions)
-    subtitle = (
-        f"Injury study of {len(runs):,} runs of the {study.model.name} model, "
-        f"{len(analysis['scenarios'])} scenario(s), {len(analysis['fronts'])} car front(s), "
-        f"seed {study.seed}"
-    )
-    return publish(
-        folder, study.title, subtitle, analysis,
-        lambda held: draw(study, cases, held, functions),
-        lambda held, figures: sections_of(study, held, figures, functions),
-    )  # fmt: skip
+    schema = InjuryStudy
+
+    def plan(self, study: InjuryStudy, folder: ResultsFolder) -> list[PreparedCell]:
+        """Return the cells, each with its model and the values of every input."""
+        return [_prepare(study, cell, folder) for cell in cells_of(study)]
+
+    def execute(
+        self,
+        study: InjuryStudy,
+        plan: list[PreparedCell],
+        folder: ResultsFolder,
+        *,
+        workers: Workers,
+        quiet: bool,
+    ) -> None:
+        """Run what is missing of all cells."""
+        run_cells(study, folder, plan, workers=workers, quiet=quiet)
+
+    def results(self, study: InjuryStudy, folder: ResultsFolder) -> InjuryResults:
+        """Return the cases of all cells, which are kept in the folder as well."""
+        model = load_study_model(study)
+        functions = check_functions(study, model)
+        frames = []
+        for cell in cells_of(study):
+            runs = cell_runs(folder, cell.name, study.design.n, model)
+            frames.append(runs.assign(scenario=cell.scenario, front=cell.front))
+        runs = pd.concat(frames, ignore_index=True)
+        ended, complete = check_failure_rate(study, model, runs)
+        cases = outcomes_of(study, runs[complete], functions)
+        folder.write_frame(CASES, cases)
+        return InjuryResults(model, functions, cases, ended)
+
+    def analyse(self, study: InjuryStudy, results: InjuryResults) -> dict[str, Any]:
+        """Return every number that the report prints."""
+        found = analyse(study, results.model, results.cases, results.functions)
+        return results.ended | found
+
+    def subtitle(
+        self, study: InjuryStudy, results: InjuryResults, analysis: Mapping[str, Any]
+    ) -> str:
+        """Return the line below the report's title."""
+        return (
+            f"Injury study of {analysis['runs']:,} runs of the {study.model.name} model, "
+            f"{len(analysis['scenarios'])} scenario(s), {len(analysis['fronts'])} car front(s), "
+            f"seed {study.seed}"
+        )
+
+    def draw(
+        self, study: InjuryStudy, results: InjuryResults, analysis: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Return the figures by file name."""
+        return draw(study, results.cases, analysis, results.functions)
+
+    def sections(
+        self,
+        study: InjuryStudy,
+        results: InjuryResults,
+        analysis: Mapping[str, Any],
+        figures: Mapping[str, Any],
+    ) -> Sequence[Section]:
+        """Return the sections of the report."""
+        return sections_of(study, analysis, figures, results.functions)
+
+    def summarise(self, analysis: Mapping[str, Any]) -> list[str]:
+        """Return the risks of the scenarios."""
+        return summarise(analysis)
 
 
 def check_functions(study: InjuryStudy, model: Model) -> dict[str, RiskFunction]:
@@ -118,7 +142,7 @@ def check_functions(study: InjuryStudy, model: Model) -> dict[str, RiskFunction]
                     f"{model.name!r} does not give"
                 )
             found[name] = function
-    config.check_outputs([study.limit.output], model, "limit.output")
+    check_outputs([study.limit.output], model, "limit.output")
     has_age = "age" in {item.name for item in model.inputs}
     if study.age is None and not has_age:
         raise UserError(f"age: model {model.name!r} has no input 'age'; give it in years")
@@ -138,12 +162,11 @@ def _prepare(study: InjuryStudy, cell: Cell, folder: ResultsFolder) -> PreparedC
     try:
         model = load_study_model(cell.study)
         check_functions(study, model)
-        columns = config.sample_inputs(cell.study, model)
-        fixed = cell.study.model_copy(update={"fixed": cell.changes.fixed})
-        for name, value in config.fixed_values(fixed, model).items():
+        columns = sample_inputs(cell.study, model)
+        for name, value in fixed_values(cell.changes.fixed, model).items():
             columns[name] = np.full(study.design.n, value)
         merged = cell.study.model_copy(update={"fixed": cell.study.fixed | cell.changes.fixed})
-        cell_folder(folder, cell.name).check_same_study(config.numbers_digest(merged, model))
+        cell_folder(folder, cell.name).check_same_study(numbers_digest(merged, model))
     except UserError as error:
         raise UserError(f"scenario {cell.scenario}, front {cell.front}: {error}") from None
     return PreparedCell(cell.name, merged, model, columns)

@@ -15,9 +15,9 @@ from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.results import check_failures, status_counts
 from mcstudy.sensitivity.given_data import FEWEST_RUNS, measure_given_data
 from mcstudy.statistics import Estimate, scale_of, varies
-from mcstudy.studyfile import config
-from mcstudy.studyfile.config import ModelComparison
+from mcstudy.studyfile.study_outputs import check_outputs
 from models.protocol import Model, complete_status
+from studies.model_comparison.schema import ModelComparison
 from studies.paired_runs import batch_of
 from studies.runs import describe_ends
 
@@ -123,7 +123,7 @@ def published_methods(study: ModelComparison, model: Model) -> dict[str, Any]:
     si = {item.name: item.unit for item in model.outputs}
     found = {}
     for k, table in enumerate(study.tables):
-        config.check_outputs(list(table.units), model, f"tables[{k}].units")
+        check_outputs(list(table.units), model, f"tables[{k}].units")
         for name, given in table.units.items():
             rows = [row.values[name] for row in table.rows
                     if row.kind == "simulated" and name in row.values]  # fmt: skip

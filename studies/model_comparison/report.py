@@ -10,11 +10,11 @@ import pandas as pd
 from mcstudy import units
 from mcstudy.figures import agreement, crash, style
 from mcstudy.report import Section, Table
-from mcstudy.studyfile.config import ModelComparison
 from mcstudy.text import capital, interval, number, quantity, unit
 from models.protocol import Model, Scene
 from studies.failure_report import failure_map, failures_said, status_table
-from studies.reconstruction import as_table, compare_with_table
+from studies.model_comparison.schema import ModelComparison
+from studies.published_tables import as_table, compare_with_table
 
 NAMED = 3
 """Inputs that a sentence names, the largest."""

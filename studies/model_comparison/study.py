@@ -3,99 +3,123 @@
 Each model runs in a cell of its own; run k of every cell has the same inputs.
 """
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import Workers
-from mcstudy.studyfile import config
-from mcstudy.studyfile.config import ModelComparison, MonteCarloStudy, load_study
+from mcstudy.report import Section
+from mcstudy.studyfile.identity import numbers_digest
 from mcstudy.studyfile.schema import Report
+from mcstudy.studyfile.study_outputs import check_outputs, report_outputs
 from models.protocol import Model, Run
+from studies.kind import StudyKind
 from studies.model_comparison.analysis import analyse, published_methods
-from studies.model_comparison.report import draw, sections_of
+from studies.model_comparison.report import draw, sections_of, summarise
+from studies.model_comparison.schema import ModelComparison
+from studies.monte_carlo.design import sample_inputs
+from studies.monte_carlo.schema import MonteCarloStudy
 from studies.paired_runs import PreparedCell, cell_folder, cell_runs, run_cells
-from studies.publishing import publish
 from studies.runs import load_study_model
 
 NOMINAL = "nominal.json"
 """Outputs and pictures' poses of the nominal run of a model, in its cell."""
 
 
-def run_comparison(
-    study: ModelComparison,
-    text: str,
-    folder: ResultsFolder,
-    *,
-    workers: Workers = -1,
-    quiet: bool = False,
-) -> dict[str, Any]:
-    """Run all models of a comparison, or go on with them, and write its results folder.
+@dataclass(frozen=True)
+class ComparisonResults:
+    """What the analysis of a comparison takes, each by label of the model.
 
-    Parameters
+    Attributes
     ----------
-    study : ModelComparison
-    text : the study file as written. folder : ResultsFolder
-    workers : processes, -1 for one a core, or the address of a dask scheduler.
-    quiet : no progress line.
-
-    Returns
-    -------
-    dict
-        The analysis, as in ``analysis.json``.
-
-    Raises
-    ------
-    UserError
-        If the study does not fit a model or the folder.
-    StudyError
-        If too many runs failed.
+    models : the models.
+    runs : their tables; run k of each has the same inputs.
+    nominal : outputs and poses of their nominal runs.
     """
-    cells = [_prepare(study, label, folder) for label in study.models]
-    models = {cell.name: cell.model for cell in cells}
-    compared_outputs(study, models)
-    published_methods(study, cells[0].model)
-    with folder.open_for_writing():
-        run_cells(study, text, folder, cells, workers=workers, quiet=quiet)
-        for cell in cells:
-            run = cell.model.run({})
-            cell_folder(folder, cell.name).write_json(
-                NOMINAL, _nominal(run, study.report.strip_times)
-            )
-        return build_report(folder)
+
+    models: dict[str, Model]
+    runs: dict[str, pd.DataFrame]
+    nominal: dict[str, dict[str, Any]]
 
 
-def build_report(folder: ResultsFolder) -> dict[str, Any]:
-    """Analyse a results folder and write its figures and report, without running a model.
+class Comparison(StudyKind[ModelComparison, list[PreparedCell], ComparisonResults]):
+    """The same inputs through two or more models."""
 
-    Raises
-    ------
-    UserError
-        If the folder is not one of a finished comparison.
-    StudyError
-        If too many runs of a model failed.
-    """
-    study = load_study(folder.path / "study.toml")
-    if not isinstance(study, ModelComparison):
-        raise UserError(f"{folder.path}: is not the folder of a model comparison")
-    models = {label: load_study_model(cell_study(study, label)) for label in study.models}
-    runs = {
-        label: cell_runs(folder, label, study.design.n, model) for label, model in models.items()
-    }
-    nominal = {label: cell_folder(folder, label).read_json(NOMINAL) for label in study.models}
-    analysis = analyse(study, models, runs, nominal, compared_outputs(study, models))
-    subtitle = (
-        f"{study.design.n:,} sets of inputs through {len(models)} models: "
-        f"{', '.join(f'{label} ({model.name})' for label, model in models.items())}, "
-        f"seed {study.seed}"
-    )
-    return publish(
-        folder, study.title, subtitle, analysis,
-        lambda held: draw(study, models, runs, nominal, held),
-        lambda held, figures: sections_of(study, models, held, figures),
-    )  # fmt: skip
+    schema = ModelComparison
+
+    def plan(self, study: ModelComparison, folder: ResultsFolder) -> list[PreparedCell]:
+        """Return the cells, each with its model and the values of every input."""
+        cells = [_prepare(study, label, folder) for label in study.models]
+        compared_outputs(study, {cell.name: cell.model for cell in cells})
+        published_methods(study, cells[0].model)
+        return cells
+
+    def execute(
+        self,
+        study: ModelComparison,
+        plan: list[PreparedCell],
+        folder: ResultsFolder,
+        *,
+        workers: Workers,
+        quiet: bool,
+    ) -> None:
+        """Run what is missing of all cells, and the nominal run of every model."""
+        run_cells(study, folder, plan, workers=workers, quiet=quiet)
+        for cell in plan:
+            poses = _nominal(cell.model.run({}), study.report.strip_times)
+            cell_folder(folder, cell.name).write_json(NOMINAL, poses)
+
+    def results(self, study: ModelComparison, folder: ResultsFolder) -> ComparisonResults:
+        """Return models, runs and nominal runs."""
+        models = {label: load_study_model(cell_study(study, label)) for label in study.models}
+        return ComparisonResults(
+            models,
+            {
+                label: cell_runs(folder, label, study.design.n, model)
+                for label, model in models.items()
+            },
+            {label: cell_folder(folder, label).read_json(NOMINAL) for label in study.models},
+        )
+
+    def analyse(self, study: ModelComparison, results: ComparisonResults) -> dict[str, Any]:
+        """Return every number that the report prints."""
+        outputs = compared_outputs(study, results.models)
+        return analyse(study, results.models, results.runs, results.nominal, outputs)
+
+    def subtitle(
+        self, study: ModelComparison, results: ComparisonResults, analysis: Mapping[str, Any]
+    ) -> str:
+        """Return the line below the report's title."""
+        named = ", ".join(f"{label} ({model.name})" for label, model in results.models.items())
+        return (
+            f"{study.design.n:,} sets of inputs through {len(results.models)} models: {named}, "
+            f"seed {study.seed}"
+        )
+
+    def draw(
+        self, study: ModelComparison, results: ComparisonResults, analysis: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Return the figures by file name."""
+        return draw(study, results.models, results.runs, results.nominal, analysis)
+
+    def sections(
+        self,
+        study: ModelComparison,
+        results: ComparisonResults,
+        analysis: Mapping[str, Any],
+        figures: Mapping[str, Any],
+    ) -> Sequence[Section]:
+        """Return the sections of the report."""
+        return sections_of(study, results.models, analysis, figures)
+
+    def summarise(self, analysis: Mapping[str, Any]) -> list[str]:
+        """Return how far the models agree."""
+        return summarise(analysis)
 
 
 def cell_study(study: ModelComparison, label: str) -> MonteCarloStudy:
@@ -121,10 +145,10 @@ def compared_outputs(study: ModelComparison, models: dict[str, Model]) -> list[s
     chosen = cell_study(study, first).model_copy(
         update={"report": Report(outputs=study.report.outputs, histories=0)}
     )
-    names = config.report_outputs(chosen, models[first])
+    names = report_outputs(chosen, models[first])
     units = {item.name: item.unit for item in models[first].outputs}
     for label, model in models.items():
-        config.check_outputs(names, model, f"models.{label}")
+        check_outputs(names, model, f"models.{label}")
         for item in model.outputs:
             if item.name in names and item.unit != units[item.name]:
                 raise UserError(
@@ -145,8 +169,8 @@ def _prepare(study: ModelComparison, label: str, folder: ResultsFolder) -> Prepa
     inner = cell_study(study, label)
     try:
         model = load_study_model(inner)
-        columns = config.sample_inputs(inner, model)
-        cell_folder(folder, label).check_same_study(config.numbers_digest(inner, model))
+        columns = sample_inputs(inner, model)
+        cell_folder(folder, label).check_same_study(numbers_digest(inner, model))
     except UserError as error:
         raise UserError(f"models.{label}: {error}") from None
     return PreparedCell(label, inner, model, columns)

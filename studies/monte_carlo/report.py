@@ -9,10 +9,10 @@ import pandas as pd
 from mcstudy import units
 from mcstudy.figures import style
 from mcstudy.report import Section, Table
-from mcstudy.studyfile.config import MonteCarloStudy
 from mcstudy.text import capital, interval, number, percent, quantity, unit
 from models.protocol import Model
 from studies.failure_report import failures_said, status_table
+from studies.monte_carlo.schema import MonteCarloStudy
 
 
 def sections_of(

@@ -1,6 +1,6 @@
-"""The Monte Carlo study: sample the inputs, run the model, describe what comes out."""
+"""The Monte Carlo study: sample the inputs, run the model, describe the outputs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,88 +11,92 @@ from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import Workers
 from mcstudy.figures import distributions, relations
-from mcstudy.studyfile import config
-from mcstudy.studyfile.config import MonteCarloStudy, load_study
+from mcstudy.report import Section, Table
+from mcstudy.studyfile.identity import numbers_digest
+from mcstudy.studyfile.study_outputs import check_outputs, report_outputs
 from models.protocol import Model, complete_status
 from studies.failure_report import failure_map
-from studies.monte_carlo.report import sections_of
-from studies.publishing import publish
-from studies.runs import columns_of, describe_runs, load_study_model, run_rows
+from studies.kind import StudyKind
+from studies.monte_carlo.design import sample_inputs
+from studies.monte_carlo.report import sections_of, summarise
+from studies.monte_carlo.schema import MonteCarloStudy
+from studies.runs import ModelRuns, RunPlan, columns_of, describe_runs, load_study_model, run_rows
 
 
-def run_monte_carlo(
-    study: MonteCarloStudy,
-    text: str,
-    folder: ResultsFolder,
-    *,
-    workers: Workers = -1,
-    quiet: bool = False,
-) -> dict[str, Any]:
-    """Run a study, or go on with it, and write its results folder.
+class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns]):
+    """Independent or stratified samples of the inputs of one model."""
 
-    Parameters
-    ----------
-    study : MonteCarloStudy
-    text : str
-        The study file as written.
-    folder : ResultsFolder
-    workers : int
-        Processes, -1 for one a core, or the address of a dask scheduler.
-    quiet : bool
-        No progress line.
+    schema = MonteCarloStudy
 
-    Returns
-    -------
-    dict
-        The analysis, as in ``analysis.json``.
+    def plan(self, study: MonteCarloStudy, folder: ResultsFolder) -> RunPlan:
+        """Return the model and the sampled values of its inputs."""
+        model = load_study_model(study)
+        report_outputs(study, model)
+        marks_of(study, model)
+        columns = sample_inputs(study, model)
+        folder.check_same_study(numbers_digest(study, model))
+        return RunPlan(model, columns, np.arange(study.design.n) // study.design.size)
 
-    Raises
-    ------
-    UserError
-        If the study does not fit the model or the folder.
-    StudyError
-        If too many runs failed.
-    """
-    model = load_study_model(study)
-    config.report_outputs(study, model)
-    marks_of(study, model)
-    columns = config.sample_inputs(study, model)
-    folder.check_same_study(config.numbers_digest(study, model))
-    size = study.design.size
-    with folder.open_for_writing():
-        folder.write_text("study.toml", text)
+    def execute(
+        self,
+        study: MonteCarloStudy,
+        plan: RunPlan,
+        folder: ResultsFolder,
+        *,
+        workers: Workers,
+        quiet: bool,
+    ) -> None:
+        """Run what is missing and keep the histories of the first runs."""
+        design = study.design
         runs = run_rows(
-            study, model, columns, folder,
-            design={"method": study.design.method, "n": study.design.n, "replicate_size": size},
-            replicate=np.arange(study.design.n) // size, workers=workers, quiet=quiet,
+            study, plan.model, plan.columns, folder,
+            design={"method": design.method, "n": design.n, "replicate_size": design.size},
+            replicate=plan.replicate, workers=workers, quiet=quiet,
         )  # fmt: skip
-        _keep_histories(study, model, runs, folder)
-        return build_report(folder)
+        _keep_histories(study, plan.model, runs, folder)
 
+    def results(self, study: MonteCarloStudy, folder: ResultsFolder) -> ModelRuns:
+        """Return the model and the runs of the design."""
+        model = load_study_model(study)
+        runs = folder.runs(columns_of(model))
+        return ModelRuns(model, runs[runs["run"] < study.design.n])
 
-def build_report(folder: ResultsFolder) -> dict[str, Any]:
-    """Analyse a results folder and write its figures and report, without running the model.
+    def analyse(self, study: MonteCarloStudy, results: ModelRuns) -> dict[str, Any]:
+        """Return every number that the report prints."""
+        return analyse(study, results.model, results.runs)
 
-    Raises
-    ------
-    UserError
-        If the folder is not one of a finished Monte Carlo study.
-    """
-    study = load_study(folder.path / "study.toml")
-    if not isinstance(study, MonteCarloStudy):
-        raise UserError(f"{folder.path}: is not the folder of a Monte Carlo study")
-    model = load_study_model(study)
-    runs = folder.runs(columns_of(model))
-    runs = runs[runs["run"] < study.design.n]
-    subtitle = (
-        f"Monte Carlo study of {len(runs):,} runs of the {model.name} model, "
-        f"{study.design.method} design, seed {study.seed}"
-    )
-    return publish(
-        folder, study.title, subtitle, analyse(study, model, runs),
-        lambda held: draw(study, model, runs, held),
-        lambda held, figures: sections_of(study, model, runs, held, figures),
-    )  # fmt: skip
+    def subtitle(
+        self, study: MonteCarloStudy, results: ModelRuns, analysis: Mapping[str, Any]
+    ) -> str:
+        """Return the line below the report's title."""
+        return (
+            f"Monte Carlo study of {len(results.runs):,} runs of the {results.model.name} model, "
+            f"{study.design.method} design, seed {study.seed}"
+        )
+
+    def draw(
+        self, study: MonteCarloStudy, results: ModelRuns, analysis: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Return the figures by file name."""
+        return draw(study, results.model, results.runs, analysis)
+
+    def sections(
+        self,
+        study: MonteCarloStudy,
+        results: ModelRuns,
+        analysis: Mapping[str, Any],
+        figures: Mapping[str, Any],
+    ) -> Sequence[Section]:
+        """Return the sections of the report."""
+        return sections_of(study, results.model, results.runs, analysis, figures)
+
+    def summarise(self, analysis: Mapping[str, Any]) -> list[Table]:
+        """Return the distributions of the reported outputs."""
+        return summarise(analysis)
+
+    def independent_rows(self, runs: pd.DataFrame, folder: ResultsFolder) -> pd.DataFrame:
+        """Return all runs: each is a draw of its own."""
+        return runs
 
 
 def marks_of(study: MonteCarloStudy, model: Model) -> dict[str, list[distributions.Mark]]:
@@ -107,7 +111,7 @@ def marks_of(study: MonteCarloStudy, model: Model) -> dict[str, list[distributio
     marks: dict[str, list[distributions.Mark]] = {}
     for k, entry in enumerate(study.report.references):
         place = f"report.references[{k}]"
-        config.check_outputs([entry.output], model, place)
+        check_outputs([entry.output], model, place)
         try:
             value = entry.value * units.factor(entry.unit, known[entry.output].unit)
         except ValueError as error:
@@ -125,7 +129,7 @@ def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[st
     groups = None if study.design.method == "monte-carlo" else complete["replicate"].to_numpy()
     marks = marks_of(study, model)
     sampled = list(study.inputs)
-    wanted = config.report_outputs(study, model)
+    wanted = report_outputs(study, model)
     analysis: dict[str, Any] = ended | {
         "outputs": {},
         "exceedance": {},

@@ -7,11 +7,11 @@ from mcstudy.figures import screening, style
 from mcstudy.report import Section, Table
 from mcstudy.sampling.factors import DUMMY, NUDGE
 from mcstudy.sampling.morris import TAIL
-from mcstudy.studyfile.config import MorrisStudy
 from mcstudy.text import capital, interval, number, unit
 from models.protocol import Model
 from studies.factor_report import groups_said
 from studies.failure_report import failure_map, failures_said, status_table
+from studies.morris.schema import MorrisStudy
 
 NAMED = 4
 """Factors that a sentence names, the largest."""
@@ -64,7 +64,7 @@ def sections_of(
                 f"Intervals are 95 %, by {study.report.resamples:,} bootstrap resamples of "
                 "trajectories. A Morris study ranks factors; shares of variance take a Sobol' "
                 "study of those that matter.",
-                *failures_said(analysis),
+                *failures_said(analysis, "trajectories"),
             ],
             [status_table(analysis)],
             one("failures", "Share of failed runs in each tenth of each input."),

@@ -1,5 +1,6 @@
 """The Morris study: which of many factors matter at all, for a few dozen runs each."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pandas as pd
@@ -7,89 +8,107 @@ import pandas as pd
 from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import Workers
+from mcstudy.report import Section
+from mcstudy.sampling.factors import factors_of
 from mcstudy.sampling.morris import draw_trajectories
 from mcstudy.sensitivity.blocks import is_enough, whole_blocks
 from mcstudy.sensitivity.morris import ElementaryEffects, estimate_effects
 from mcstudy.statistics import Estimate
-from mcstudy.studyfile import config
-from mcstudy.studyfile.config import MorrisStudy, load_study
+from mcstudy.studyfile.identity import numbers_digest
+from mcstudy.studyfile.study_inputs import check_independent, map_inputs
+from mcstudy.studyfile.study_outputs import report_outputs
 from models.protocol import Model
-from studies.morris.report import draw, sections_of
-from studies.publishing import publish
-from studies.runs import check_failure_rate, complete_blocks, load_study_model, run_rows
+from studies.kind import StudyKind
+from studies.morris.report import draw, sections_of, summarise
+from studies.morris.schema import MorrisStudy
+from studies.runs import (
+    ModelRuns,
+    RunPlan,
+    check_failure_rate,
+    complete_blocks,
+    load_study_model,
+    run_rows,
+)
 
 
-def run_morris(
-    study: MorrisStudy,
-    text: str,
-    folder: ResultsFolder,
-    *,
-    workers: Workers = -1,
-    quiet: bool = False,
-) -> dict[str, Any]:
-    """Run a Morris study, or go on with it, and write its results folder.
+class Morris(StudyKind[MorrisStudy, RunPlan, ModelRuns]):
+    """Trajectories that change one factor of one model after the other."""
 
-    Parameters
-    ----------
-    study : MorrisStudy
-    text : the study file as written. folder : ResultsFolder
-    workers : processes, -1 for one a core, or the address of a dask scheduler.
-    quiet : no progress line.
+    schema = MorrisStudy
 
-    Returns
-    -------
-    dict
-        The analysis, as in ``analysis.json``.
+    def plan(self, study: MorrisStudy, folder: ResultsFolder) -> RunPlan:
+        """Return the model and the values of its inputs along all trajectories."""
+        model = load_study_model(study)
+        report_outputs(study, model)
+        check_independent(study)
+        design = study.design
+        drawn = draw_trajectories(
+            list(study.inputs), study.groups, design.n, design.levels, study.seed
+        )
+        columns = map_inputs(study, model, drawn.uniforms)
+        folder.check_same_study(numbers_digest(study, model))
+        return RunPlan(model, columns, drawn.trajectory)
 
-    Raises
-    ------
-    UserError
-        If the study does not fit the model or the folder, or its inputs are dependent.
-    StudyError
-        If too many runs failed.
-    """
-    model = load_study_model(study)
-    config.report_outputs(study, model)
-    config.check_independent(study)
-    design = study.design
-    drawn = draw_trajectories(list(study.inputs), study.groups, design.n, design.levels, study.seed)
-    columns = config.map_inputs(study, model, drawn.uniforms)
-    folder.check_same_study(config.numbers_digest(study, model))
-    with folder.open_for_writing():
-        folder.write_text("study.toml", text)
+    def execute(
+        self,
+        study: MorrisStudy,
+        plan: RunPlan,
+        folder: ResultsFolder,
+        *,
+        workers: Workers,
+        quiet: bool,
+    ) -> None:
+        """Run what is missing of the trajectories."""
+        block = len(factors_of(list(study.inputs), study.groups)) + 1
         run_rows(
-            study, model, columns, folder,
-            design={"method": "morris", "n": len(drawn.levels), "block": drawn.block,
-                    "trajectories": design.n},
-            replicate=drawn.trajectory, workers=workers, quiet=quiet,
+            study, plan.model, plan.columns, folder,
+            design={"method": "morris", "n": len(plan.replicate), "block": block,
+                    "trajectories": study.design.n},
+            replicate=plan.replicate, workers=workers, quiet=quiet,
         )  # fmt: skip
-        return build_report(folder)
 
+    def results(self, study: MorrisStudy, folder: ResultsFolder) -> ModelRuns:
+        """Return the model and the runs of the trajectories that are whole."""
+        model = load_study_model(study)
+        return ModelRuns(model, complete_blocks(folder, model))
 
-def build_report(folder: ResultsFolder) -> dict[str, Any]:
-    """Analyse a results folder and write its figures and report, without running the model.
+    def analyse(self, study: MorrisStudy, results: ModelRuns) -> dict[str, Any]:
+        """Return every number that the report prints."""
+        return analyse(study, results.model, results.runs)
 
-    Raises
-    ------
-    UserError
-        If the folder is not one of a Morris study, or holds too few runs yet.
-    StudyError
-        If failed runs leave too few trajectories.
-    """
-    study = load_study(folder.path / "study.toml")
-    if not isinstance(study, MorrisStudy):
-        raise UserError(f"{folder.path}: is not the folder of a Morris study")
-    model = load_study_model(study)
-    runs = complete_blocks(folder, model)
-    analysis = analyse(study, model, runs)
-    subtitle = (
-        f"Morris screening by {len(runs):,} runs of the {model.name} model: "
-        f"{analysis['trajectories']:,} trajectories, seed {study.seed}"
-    )
-    return publish(
-        folder, study.title, subtitle, analysis, draw,
-        lambda held, figures: sections_of(study, model, held, figures),
-    )  # fmt: skip
+    def subtitle(self, study: MorrisStudy, results: ModelRuns, analysis: Mapping[str, Any]) -> str:
+        """Return the line below the report's title."""
+        return (
+            f"Morris screening by {len(results.runs):,} runs of the {results.model.name} model: "
+            f"{analysis['trajectories']:,} trajectories, seed {study.seed}"
+        )
+
+    def draw(
+        self, study: MorrisStudy, results: ModelRuns, analysis: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Return the figures by file name."""
+        return draw(analysis)
+
+    def sections(
+        self,
+        study: MorrisStudy,
+        results: ModelRuns,
+        analysis: Mapping[str, Any],
+        figures: Mapping[str, Any],
+    ) -> Sequence[Section]:
+        """Return the sections of the report."""
+        return sections_of(study, results.model, analysis, figures)
+
+    def summarise(self, analysis: Mapping[str, Any]) -> list[str]:
+        """Return what matters for the reported outputs."""
+        return summarise(analysis)
+
+    def independent_rows(self, runs: pd.DataFrame, folder: ResultsFolder) -> pd.DataFrame:
+        """Refuse: trajectories are no sample of the inputs."""
+        raise UserError(
+            f"{folder.path}: trajectories of a Morris study are no sample of its inputs; its own "
+            "report ranks them"
+        )
 
 
 def analyse(study: MorrisStudy, model: Model, runs: pd.DataFrame) -> dict[str, Any]:
@@ -123,7 +142,7 @@ def analyse(study: MorrisStudy, model: Model, runs: pd.DataFrame) -> dict[str, A
             )  # fmt: skip
             entry["factors"] = _by_factor(found, drawn.factors)
         analysis["outputs"][item.name] = entry
-    wanted = config.report_outputs(study, model)
+    wanted = report_outputs(study, model)
     analysis["ranked"] = [name for name in wanted if "factors" in analysis["outputs"][name]]
     if not analysis["ranked"]:
         raise StudyError(

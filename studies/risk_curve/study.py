@@ -13,11 +13,11 @@ from mcstudy.figures import risk, style
 from mcstudy.injury.cases import observations_of, read_cases, read_parquet
 from mcstudy.injury.risk_curve import INFLUENTIAL, describe_risk
 from mcstudy.report import Section, Table
-from mcstudy.studyfile.config import InjuryStudy, load_study
-from mcstudy.studyfile.schema import REFERENCE
 from mcstudy.text import interval, number, unit
 from studies.injury.analysis import CASES, proportional
 from studies.injury.cells import fronts_of
+from studies.injury.schema import REFERENCE, InjuryStudy
+from studies.kinds import load_study
 from studies.publishing import publish
 from studies.runs import load_study_model
 

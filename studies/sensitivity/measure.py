@@ -5,17 +5,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from mcstudy.errors import UserError
 from mcstudy.execution.progress import follow
 from mcstudy.execution.results import ResultsFolder
-from mcstudy.sampling.saltelli import is_base_row
 from mcstudy.sensitivity.given_data import measure_given_data
 from mcstudy.statistics import Estimate
-from mcstudy.studyfile import config
-from mcstudy.studyfile.config import MonteCarloStudy, MorrisStudy, SobolStudy, load_study
+from mcstudy.studyfile.schema import SampledStudy
+from mcstudy.studyfile.study_inputs import dependent_pairs
+from mcstudy.studyfile.study_outputs import check_outputs, report_outputs
 from models.protocol import complete_status
+from studies.kinds import KINDS, load_study
 from studies.main_effects import main_effects_of
 from studies.publishing import publish
 from studies.runs import columns_of, load_study_model
@@ -50,12 +50,8 @@ def measure_sensitivity(
         input, or too few runs have a value.
     """
     study = load_study(source.path / "study.toml")
-    if isinstance(study, MorrisStudy):
-        raise UserError(
-            f"{source.path}: trajectories of a Morris study are no sample of its inputs; its own "
-            "report ranks them"
-        )
-    if not isinstance(study, MonteCarloStudy | SobolStudy):
+    kind = KINDS.get(study.kind)
+    if kind is None or not isinstance(study, SampledStudy):
         raise UserError(
             f"{source.path}: is the folder of a study of kind {study.kind}; sensitivity is "
             "measured in those of Monte Carlo and Sobol' studies"
@@ -65,9 +61,9 @@ def measure_sensitivity(
         raise UserError(f"{folder.path}: holds the study itself; choose another --out")
     model = load_study_model(study)
     if outputs:
-        config.check_outputs(outputs, model, "--output")
-    wanted = list(outputs or config.report_outputs(study, model))
-    runs = _independent(source, source.runs(columns_of(model)))
+        check_outputs(outputs, model, "--output")
+    wanted = list(outputs or report_outputs(study, model))
+    runs = kind.independent_rows(source.runs(columns_of(model)), source)
     complete = runs[runs["status"].isin(complete_status(model))]
     inputs = list(study.inputs)
     analysis: dict[str, Any] = {
@@ -75,7 +71,7 @@ def measure_sensitivity(
         "kind": study.kind,
         "title": study.title,
         "runs": len(complete),
-        "dependent": sorted({name for pair in config.dependent_pairs(study) for name in pair}),
+        "dependent": sorted({name for pair in dependent_pairs(study) for name in pair}),
         "outputs": {},
         "main_effects": {},
     }
@@ -108,11 +104,3 @@ def measure_sensitivity(
     with folder.open_for_writing():
         subtitle = f"Sensitivity from {len(complete):,} runs of the {study.kind} study {study.name}"
         return publish(folder, study.title, subtitle, analysis, draw, sections_of)
-
-
-def _independent(source: ResultsFolder, runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the runs that were drawn independently: of Saltelli's blocks the rows of A and B."""
-    block = source.design()["block"]
-    if block == 1:
-        return runs
-    return runs[is_base_row(runs["run"].to_numpy(), block)]

@@ -15,11 +15,11 @@ from mcstudy.sampling.saltelli import block_size, is_base_row
 from mcstudy.sensitivity.blocks import FEWEST_BLOCKS, is_enough, outputs_alike, whole_blocks
 from mcstudy.sensitivity.sobol import Indices, estimate_indices, split_blocks
 from mcstudy.statistics import Estimate
-from mcstudy.studyfile import config
-from mcstudy.studyfile.config import SobolStudy
+from mcstudy.studyfile.study_outputs import report_outputs
 from models.protocol import Model
 from studies.main_effects import main_effects_of
 from studies.runs import check_failure_rate
+from studies.sobol.schema import SobolStudy
 
 Array = NDArray[np.float64]
 
@@ -121,7 +121,7 @@ def _rank(study: SobolStudy, model: Model, runs: pd.DataFrame) -> _Ranked:
         for column, entry in zip(same.tolist(), entries, strict=True):
             item = model.outputs[column]
             outputs[item.name] = {"unit": item.unit, "base_points": int(pattern.sum())} | entry
-    reported = config.report_outputs(study, model)
+    reported = report_outputs(study, model)
     wanted = [name for name in reported if "total" in outputs[name]]
     if not wanted:
         raise StudyError(

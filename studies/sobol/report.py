@@ -7,11 +7,11 @@ from mcstudy.figures import sensitivity, style
 from mcstudy.report import Section, Table
 from mcstudy.sampling.factors import DUMMY, NUDGE
 from mcstudy.sampling.saltelli import SCRAMBLES
-from mcstudy.studyfile.config import SobolStudy
 from mcstudy.text import capital, quantity, share
 from models.protocol import Model
 from studies.factor_report import groups_said
 from studies.failure_report import failure_map, failures_said, status_table
+from studies.sobol.schema import SobolStudy
 
 NAMED = 4
 """Factors that a sentence names, the largest."""
@@ -105,7 +105,11 @@ def sections_of(
         ),
         Section(
             "How sure the numbers are",
-            [_convergence_said(analysis), _intervals_said(study), *failures_said(analysis)],
+            [
+                _convergence_said(analysis),
+                _intervals_said(study),
+                *failures_said(analysis, "base points"),
+            ],
             [status_table(analysis)],
             one("convergence", "Total indices on growing parts of the design, with 95 % bands; the "
                 "largest factors.")

@@ -1,105 +1,117 @@
 """The Sobol' study: how much of the variance of each output each factor explains."""
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mcstudy.errors import UserError
+import pandas as pd
+
 from mcstudy.execution.progress import say
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import Workers
-from mcstudy.sampling.saltelli import draw_saltelli
-from mcstudy.studyfile import config
-from mcstudy.studyfile.config import SobolStudy, load_study
-from studies.publishing import publish
-from studies.runs import complete_blocks, load_study_model, run_rows
+from mcstudy.report import Section
+from mcstudy.sampling.factors import factors_of
+from mcstudy.sampling.saltelli import block_size, draw_saltelli, is_base_row
+from mcstudy.studyfile.identity import numbers_digest
+from mcstudy.studyfile.study_inputs import check_independent, map_inputs
+from mcstudy.studyfile.study_outputs import report_outputs
+from studies.kind import StudyKind
+from studies.runs import ModelRuns, RunPlan, complete_blocks, load_study_model, run_rows
 from studies.sobol.analysis import analyse, widest_interval
-from studies.sobol.report import draw, sections_of
+from studies.sobol.report import draw, sections_of, summarise
+from studies.sobol.schema import SobolStudy
 
 
-def run_sobol(
-    study: SobolStudy,
-    text: str,
-    folder: ResultsFolder,
-    *,
-    workers: Workers = -1,
-    quiet: bool = False,
-) -> dict[str, Any]:
-    """Run a Sobol' study, or go on with it, and write its results folder.
+class Sobol(StudyKind[SobolStudy, RunPlan, ModelRuns]):
+    """Saltelli's design of one model, doubled until the indices are known well enough.
 
-    The design doubles from ``design.start`` base points until the widest interval of a total index
-    of the reported outputs is below ``design.tolerance``, or ``design.n`` is reached; without a
-    tolerance it goes to ``design.n`` at once. Earlier runs are never repeated.
-
-    Parameters
-    ----------
-    study : SobolStudy
-    text : the study file as written. folder : ResultsFolder
-    workers : processes, -1 for one a core, or the address of a dask scheduler.
-    quiet : no progress line.
-
-    Returns
-    -------
-    dict
-        The analysis, as in ``analysis.json``.
-
-    Raises
-    ------
-    UserError
-        If the study does not fit the model or the folder, or its inputs are dependent.
-    StudyError
-        If too many runs failed.
+    It doubles from ``design.start`` base points until the widest interval of a total index of the
+    reported outputs is below ``design.tolerance``, or ``design.n`` is reached; without a tolerance
+    it goes to ``design.n`` at once. Earlier runs are never repeated.
     """
-    model = load_study_model(study)
-    config.report_outputs(study, model)
-    config.check_independent(study)
-    design = study.design
-    drawn = draw_saltelli(
-        list(study.inputs), study.groups, design.n, study.seed, second_order=design.second_order
-    )
-    columns = config.map_inputs(study, model, drawn.uniforms)
-    folder.check_same_study(config.numbers_digest(study, model))
-    n = design.n if design.tolerance is None else min(design.start, design.n)
-    with folder.open_for_writing():
-        folder.write_text("study.toml", text)
+
+    schema = SobolStudy
+
+    def plan(self, study: SobolStudy, folder: ResultsFolder) -> RunPlan:
+        """Return the model and the values of its inputs over the whole design."""
+        model = load_study_model(study)
+        report_outputs(study, model)
+        check_independent(study)
+        design = study.design
+        drawn = draw_saltelli(
+            list(study.inputs), study.groups, design.n, study.seed, second_order=design.second_order
+        )
+        columns = map_inputs(study, model, drawn.uniforms)
+        folder.check_same_study(numbers_digest(study, model))
+        return RunPlan(model, columns, drawn.scramble)
+
+    def execute(
+        self,
+        study: SobolStudy,
+        plan: RunPlan,
+        folder: ResultsFolder,
+        *,
+        workers: Workers,
+        quiet: bool,
+    ) -> None:
+        """Run the design, doubling it as far as needed."""
+        design = study.design
+        factors = factors_of(list(study.inputs), study.groups)
+        block = block_size(factors, second_order=design.second_order)
+        n = design.n if design.tolerance is None else min(design.start, design.n)
         while True:
-            rows = n * drawn.block
+            rows = n * block
+            columns = {name: values[:rows] for name, values in plan.columns.items()}
             runs = run_rows(
-                study, model, {name: values[:rows] for name, values in columns.items()}, folder,
-                design={"method": "saltelli", "n": rows, "block": drawn.block, "base_points": n},
-                replicate=drawn.scramble[:rows], workers=workers, quiet=quiet,
+                study, plan.model, columns, folder,
+                design={"method": "saltelli", "n": rows, "block": block, "base_points": n},
+                replicate=plan.replicate[:rows], workers=workers, quiet=quiet,
             )  # fmt: skip
             if design.tolerance is None or n >= design.n:
-                break
-            width = widest_interval(study, model, runs)
+                return
+            width = widest_interval(study, plan.model, runs)
             known = "cannot be estimated yet" if math.isinf(width) else f"{width:.3f}"
             say(f"{n} base points: widest interval of a total index {known}", quiet=quiet)
             if width <= design.tolerance:
-                break
+                return
             n *= 2
-        return build_report(folder)
 
+    def results(self, study: SobolStudy, folder: ResultsFolder) -> ModelRuns:
+        """Return the model and the runs of the base points that are whole."""
+        model = load_study_model(study)
+        return ModelRuns(model, complete_blocks(folder, model))
 
-def build_report(folder: ResultsFolder) -> dict[str, Any]:
-    """Analyse a results folder and write its figures and report, without running the model.
+    def analyse(self, study: SobolStudy, results: ModelRuns) -> dict[str, Any]:
+        """Return every number that the report prints."""
+        return analyse(study, results.model, results.runs)
 
-    Raises
-    ------
-    UserError
-        If the folder is not one of a Sobol' study, or holds too few runs yet.
-    StudyError
-        If failed runs leave too few base points.
-    """
-    study = load_study(folder.path / "study.toml")
-    if not isinstance(study, SobolStudy):
-        raise UserError(f"{folder.path}: is not the folder of a Sobol' study")
-    model = load_study_model(study)
-    runs = complete_blocks(folder, model)
-    analysis = analyse(study, model, runs)
-    subtitle = (
-        f"Sobol' study of {len(runs):,} runs of the {model.name} model: "
-        f"{analysis['base_points']:,} base points, seed {study.seed}"
-    )
-    return publish(
-        folder, study.title, subtitle, analysis, draw,
-        lambda held, figures: sections_of(study, model, held, figures),
-    )  # fmt: skip
+    def subtitle(self, study: SobolStudy, results: ModelRuns, analysis: Mapping[str, Any]) -> str:
+        """Return the line below the report's title."""
+        return (
+            f"Sobol' study of {len(results.runs):,} runs of the {results.model.name} model: "
+            f"{analysis['base_points']:,} base points, seed {study.seed}"
+        )
+
+    def draw(
+        self, study: SobolStudy, results: ModelRuns, analysis: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Return the figures by file name."""
+        return draw(analysis)
+
+    def sections(
+        self,
+        study: SobolStudy,
+        results: ModelRuns,
+        analysis: Mapping[str, Any],
+        figures: Mapping[str, Any],
+    ) -> Sequence[Section]:
+        """Return the sections of the report."""
+        return sections_of(study, results.model, analysis, figures)
+
+    def summarise(self, analysis: Mapping[str, Any]) -> list[str]:
+        """Return what drives the reported outputs."""
+        return summarise(analysis)
+
+    def independent_rows(self, runs: pd.DataFrame, folder: ResultsFolder) -> pd.DataFrame:
+        """Return the rows of Saltelli's matrices A and B."""
+        return runs[is_base_row(runs["run"].to_numpy(), folder.design()["block"])]

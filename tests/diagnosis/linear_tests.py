@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from mcstudy.diagnosis.problem import (
     Cause,
@@ -17,6 +16,8 @@ from mcstudy.diagnosis.problem import (
     Test,
     Unknown,
 )
+from mcstudy.studyfile.distributions import Normal
+from mcstudy.studyfile.input_space import InputSpace
 
 Array = NDArray[np.float64]
 
@@ -24,9 +25,9 @@ TIME = np.linspace(-0.004, 0.02, 121)
 RANGES = {"impact_speed": (0.0, 100.0), "scale": (-100.0, 100.0)}
 
 
-def normal(probability: float) -> float:
-    """Quantile of a standard normal: a value that is its own score."""
-    return float(special.ndtri(probability))
+def normal(name: str) -> InputSpace:
+    """Prior of a standard normal: a value that is its own score."""
+    return InputSpace({name: Normal(distribution="normal", mean=0.0, sd=1.0)}, {name: "1"})
 
 
 def pulse(time: Array) -> Array:
@@ -51,7 +52,7 @@ class Linear:
         return Observation({"head_acceleration": (time, values)}, {})
 
 
-SIZE = Parameter("size", "1", "", normal, 0.0, "normal")
+SIZE = Parameter("size", "1", "", normal("size"), 0.0, "normal")
 BUMP = Cause(
     "bump", "a bump", (Form("bump", "bump", {}, (SIZE,)),), "size", "late in the pulse", (), "no"
 )
@@ -77,4 +78,4 @@ def make_problem(
             Test(f"t{k}", {"impact_speed": recorded}, {"impact_speed": speed_sd},
                  (Signal("head_acceleration", TIME, values, noise),), (), (), {"order": float(k)})
         )  # fmt: skip
-    return Problem(tuple(rows), (Unknown("scale", normal),), Linear(), RANGES)
+    return Problem(tuple(rows), (Unknown("scale", normal("scale")),), Linear(), RANGES)

@@ -1,6 +1,7 @@
 """A small model as the methods see it, and a small study of it, for tests without physics."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -85,10 +86,18 @@ histories = 2
 """
 
 
-def edited(*edits: tuple[str, str]) -> str:
+def edited(*edits: tuple[str, str], text: str = STUDY) -> str:
     """Return the small study with each old text replaced by a new one, once."""
-    text = STUDY
     for old, new in edits:
         assert old in text, f"{old!r} is not in the study"
         text = text.replace(old, new, 1)
     return text
+
+
+def edits_of(row: tuple[Any, ...]) -> tuple[list[tuple[str, str]], tuple[str, ...]]:
+    """Return the edits and the parts of the message of a row (old, new, *parts).
+
+    Old and new may be tuples, of several edits.
+    """
+    old, new, *parts = row
+    return [(old, new)] if isinstance(old, str) else list(zip(old, new, strict=True)), tuple(parts)

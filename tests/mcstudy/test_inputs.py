@@ -12,14 +12,10 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 from scipy import stats
 
-from mcstudy.studyfile.config import MonteCarloStudy, load_study
-from mcstudy.studyfile.distributions import (
-    Distribution,
-    GrowthChart,
-    copula_factor,
-    sample_values,
-    sampling_order,
-)
+from mcstudy.studyfile.distributions import Distribution, GrowthChart, sample_values
+from mcstudy.studyfile.input_space import copula_factor, sampling_order
+from studies.kinds import load_study
+from studies.monte_carlo.schema import MonteCarloStudy
 
 Array = NDArray[np.float64]
 

@@ -2,17 +2,14 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
+from mcstudy_tools import Array, Flags, quiet
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy import optimize, stats
 
 from mcstudy.injury.observations import Observations, observe
 from mcstudy.injury.turnbull import StepRisk, estimate_steps
-
-Array = NDArray[np.float64]
-
-QUIET = settings(derandomize=True, deadline=None, database=None, max_examples=40)
 
 # Breast retraction after radiotherapy alone, months (D. Finkelstein, R. Wolfe, Biometrics 41, 1985;
 # in this order in R's package interval, bcos).
@@ -47,7 +44,7 @@ def mixed(seed: int, n: int = 40) -> Observations:
     return Observations(low, high)
 
 
-def membership(observations: Observations, steps: StepRisk) -> NDArray[np.bool_]:
+def membership(observations: Observations, steps: StepRisk) -> Flags:
     """Return whether a case (row) holds an interval of the estimate (column), by a point in it.
 
     The point is the middle of an interval or the value of a point: a case (low, high] holds it if
@@ -82,7 +79,7 @@ def max_min(x: Array, injured: Array) -> tuple[Array, Array]:
     return places, np.array([max(means[j, i:].min() for j in range(i + 1)) for i in range(m)])
 
 
-@QUIET
+@quiet(40)
 @given(
     cases=st.lists(st.tuples(st.integers(1, 12), st.booleans()), min_size=2, max_size=30),
 )
@@ -94,7 +91,7 @@ def test_left_and_right_censored_cases_give_isotonic_regression(
     injured = np.array([hurt for _, hurt in cases])
     steps = estimate_steps(of(np.where(injured, 0.0, x), np.where(injured, x, np.inf)))
     places, risk = max_min(x, injured.astype(float))
-    np.testing.assert_allclose(value_at(steps, places), risk, atol=1e-12)
+    assert_allclose(value_at(steps, places), risk, atol=1e-12)
     assert float(steps.share.sum()) == pytest.approx(1.0, abs=1e-12)
     assert np.all(steps.share > 0.0)
     assert np.all(steps.low < steps.high)
@@ -108,35 +105,30 @@ def test_many_distinct_cases_equal_scipys_isotonic_regression() -> None:
     order = np.argsort(x)
     expected = optimize.isotonic_regression(injured[order].astype(float)).x
     steps = estimate_steps(observe(x, injured))
-    np.testing.assert_allclose(value_at(steps, x[order]), expected, atol=1e-12)
+    assert_allclose(value_at(steps, x[order]), expected, atol=1e-12)
 
 
-def test_cases_by_hand() -> None:
+# -- by hand ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("low", "high", "expected"), [
     # Injured at 1, 2 and 4, uninjured at 3 and 5: pooled 2/3 up to 3, then 1/2 of 4 and 5 pools
     # with them: 3/5. An uninjured first case at 0.5 stays apart. The rest lies beyond 5.
-    steps = estimate_steps(of([0.5, 0, 0, 3, 0, 5], [np.inf, 1, 2, np.inf, 4, np.inf]))
-    np.testing.assert_allclose(steps.low, [0.5, 5.0])
-    np.testing.assert_allclose(steps.high, [1.0, np.inf])
-    np.testing.assert_allclose(steps.share, [0.6, 0.4], atol=1e-12)
-
-
-# -- exact: the empirical distribution -------------------------------------------------------
-
-
-def test_exact_cases_give_the_empirical_distribution() -> None:
-    x = np.array([3.0, 1.0, 4.0, 1.5, 9.0, 2.6, 5.0])
-    steps = estimate_steps(of(x, x))
-    expected = stats.ecdf(x).cdf
-    np.testing.assert_allclose(steps.high, expected.quantiles)
-    np.testing.assert_allclose(np.cumsum(steps.share), expected.probabilities, atol=1e-9)
-    np.testing.assert_array_equal(steps.low, steps.high)
-
-
-def test_ties_of_exact_cases_count_together() -> None:
-    x = np.array([2.0, 2.0, 2.0, 5.0, 5.0, 7.0])
-    steps = estimate_steps(of(x, x))
-    np.testing.assert_array_equal(steps.high, [2.0, 5.0, 7.0])
-    np.testing.assert_allclose(steps.share, [3 / 6, 2 / 6, 1 / 6], atol=1e-9)
+    ([0.5, 0, 0, 3, 0, 5], [O, 1, 2, O, 4, O], [(0.5, 1, 0.6), (5, O, 0.4)]),
+    # (0, 2], (1, 3] and (2.5, inf): innermost are (1, 2] and (2.5, 3]. With p in the first the
+    # likelihood is p * 1 * (1 - p), greatest at 1/2.
+    ([0, 1, 2.5], [2, 3, O], [(1, 2, 0.5), (2.5, 3, 0.5)]),
+    # (1, 5] holds an onset at 5, (5, 8] does not: the first shares the point, the second has a
+    # share of its own.
+    ([1, 5, 5], [5, 5, 8], [(5, 5, 2 / 3), (5, 8, 1 / 3)]),
+    # Exact cases: the empirical distribution, ties together.
+    ([2, 2, 7, 5, 2, 5], [2, 2, 7, 5, 2, 5], [(2, 2, 1 / 2), (5, 5, 1 / 3), (7, 7, 1 / 6)]),
+])  # fmt: skip
+def test_estimates_by_hand(
+    low: list[float], high: list[float], expected: list[tuple[float, ...]]
+) -> None:
+    steps = estimate_steps(of(low, high))
+    assert_allclose(np.stack([steps.low, steps.high, steps.share], axis=1), expected, atol=1e-7)
 
 
 def test_exact_and_right_censored_cases_give_kaplan_and_meiers_curve() -> None:
@@ -146,7 +138,7 @@ def test_exact_and_right_censored_cases_give_kaplan_and_meiers_curve() -> None:
     seen = rng.random(60) < 0.6
     steps = estimate_steps(of(x, np.where(seen, x, np.inf)))
     theirs = stats.ecdf(stats.CensoredData(uncensored=x[seen], right=x[~seen])).cdf
-    np.testing.assert_allclose(value_at(steps, theirs.quantiles), theirs.probabilities, atol=1e-6)
+    assert_allclose(value_at(steps, theirs.quantiles), theirs.probabilities, atol=1e-6)
 
 
 # -- intervals -------------------------------------------------------------------------------
@@ -157,42 +149,20 @@ def test_the_textbook_example_of_interval_censored_cases() -> None:
     # with the independent EM below.
     steps = estimate_steps(of(COSMESIS_LOW, COSMESIS_HIGH))
     kept = steps.share > 1e-4
-    np.testing.assert_array_equal(steps.low[kept], [4, 6, 7, 11, 24, 33, 38, 46])
-    np.testing.assert_array_equal(steps.high[kept], [5, 7, 8, 12, 25, 34, 40, 48])
-    np.testing.assert_allclose(
+    assert_array_equal(steps.low[kept], [4, 6, 7, 11, 24, 33, 38, 46])
+    assert_array_equal(steps.high[kept], [5, 7, 8, 12, 25, 34, 40, 48])
+    assert_allclose(
         steps.share[kept],
         [0.0463, 0.0334, 0.0887, 0.0708, 0.0926, 0.0818, 0.1209, 0.4656],
         atol=1e-4,
     )
 
 
-def test_three_cases_by_hand() -> None:
-    # (0, 2], (1, 3] and (2.5, inf): innermost are (1, 2] and (2.5, 3]. With p in the first the
-    # likelihood is p * 1 * (1 - p), greatest at 1/2.
-    steps = estimate_steps(of([0, 1, 2.5], [2, 3, np.inf]))
-    np.testing.assert_array_equal(steps.low, [1.0, 2.5])
-    np.testing.assert_array_equal(steps.high, [2.0, 3.0])
-    np.testing.assert_allclose(steps.share, [0.5, 0.5], atol=1e-7)
-
-
-def test_an_interval_holds_its_end_and_not_its_beginning() -> None:
-    # (1, 5] holds an onset at 5, (5, 8] does not: the first shares the point, the second has a
-    # share of its own.
-    steps = estimate_steps(of([1, 5, 5], [5, 5, 8]))
-    np.testing.assert_array_equal(steps.low, [5.0, 5.0])
-    np.testing.assert_array_equal(steps.high, [5.0, 8.0])
-    np.testing.assert_allclose(steps.share, [2 / 3, 1 / 3], atol=1e-7)
-
-
-def independent_em(observations: Observations, steps: int = 30_000) -> tuple[Array, Array]:
-    """Return cells of all end points and their shares by plain EM: (a, b] and points alike.
-
-    Cells: the open intervals between neighbouring ends, and the ends themselves.
-    """
+def independent_em(observations: Observations, steps: int = 30_000) -> Array:
+    """Return the probability of every case by plain EM on points and the gaps between them."""
     low, high = observations.low, observations.high
     ends = np.unique(np.concatenate([low, high[np.isfinite(high)]]))
-    gaps = np.append(0.5 * (ends[1:] + ends[:-1]), ends[-1] + 1.0)
-    cells = np.sort(np.concatenate([ends, gaps]))
+    cells = np.sort(np.concatenate([ends, 0.5 * (ends[1:] + ends[:-1]), [ends[-1] + 1.0]]))
     holds = (low[:, None] < cells) & (cells <= high[:, None])
     exact = low == high
     holds[exact] = cells == high[exact][:, None]
@@ -202,7 +172,7 @@ def independent_em(observations: Observations, steps: int = 30_000) -> tuple[Arr
         if np.max(np.abs(updated - share)) < 1e-12:
             break
         share = updated
-    return cells, holds @ share
+    return holds @ share
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -212,12 +182,12 @@ def test_the_likelihood_is_that_of_an_independent_em(seed: int) -> None:
     observations = of(COSMESIS_LOW, COSMESIS_HIGH) if seed == 0 else mixed(seed)
     steps = estimate_steps(observations)
     ours = membership(observations, steps) @ steps.share
-    _, theirs = independent_em(observations)
-    np.testing.assert_allclose(ours, theirs, atol=2e-4)
+    theirs = independent_em(observations)
+    assert_allclose(ours, theirs, atol=2e-4)
     assert float(np.log(ours).sum()) == pytest.approx(float(np.log(theirs).sum()), abs=1e-4)
 
 
-@QUIET
+@quiet(40)
 @given(seed=st.integers(0, 10_000), n=st.integers(3, 30))
 def test_shares_are_self_consistent_and_of_greatest_likelihood(seed: int, n: int) -> None:
     # Turnbull 1976: a share is the mean over the cases of their chance to lie there. Gentleman and
@@ -232,44 +202,23 @@ def test_shares_are_self_consistent_and_of_greatest_likelihood(seed: int, n: int
     chance = holds @ steps.share
     assert np.all(chance > 0.0)
     consistent = steps.share * (holds / chance[:, None]).mean(axis=0)
-    np.testing.assert_allclose(steps.share, consistent, atol=1e-7)
+    assert_allclose(steps.share, consistent, atol=1e-7)
     assert float(steps.share.sum()) == pytest.approx(1.0, abs=1e-9)
     assert np.all(steps.share >= 0.0)
     assert np.all((holds / chance[:, None]).mean(axis=0) <= 1.0 + 2e-3)
     assert np.all(np.diff(steps.high) >= 0.0)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_the_order_of_the_cases_does_not_count(seed: int) -> None:
-    plain = mixed(seed)
-    order = np.random.default_rng(seed).permutation(plain.size)
-    a = estimate_steps(plain)
-    b = estimate_steps(Observations(plain.low[order], plain.high[order]))
-    np.testing.assert_array_equal(a.low, b.low)
-    np.testing.assert_allclose(a.share, b.share, atol=1e-7)
+    order = np.random.default_rng(seed).permutation(n)
+    other = estimate_steps(Observations(observations.low[order], observations.high[order]))
+    assert_array_equal(other.low, steps.low)
+    assert_allclose(other.share, steps.share, atol=1e-7)
 
 
 # -- the drawn steps -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_the_drawn_curve_rises_at_the_end_of_each_interval(seed: int) -> None:
-    steps = estimate_steps(mixed(seed))
+def test_the_drawn_curve_rises_at_the_end_of_each_interval() -> None:
+    shares = np.array([0.2, 0.5, 0.3])
+    steps = StepRisk(np.array([0.0, 2.0, 5.0]), np.array([1.0, 3.0, np.inf]), shares)
     x, risk = steps.steps()
-    assert x.shape == risk.shape
-    assert (x[0], risk[0]) == (0.0, 0.0)
-    assert np.isfinite(x).all()
-    assert np.all(np.diff(x) >= 0.0)
-    assert np.all(np.diff(risk) >= 0.0)
-    held = steps.high[np.isfinite(steps.high)]
-    tops = [float(risk[x == end].max()) for end in held]
-    np.testing.assert_allclose(tops, value_at(steps, held), atol=1e-12)
-
-
-def test_the_drawn_curve_by_hand() -> None:
-    steps = StepRisk(
-        np.array([0.0, 2.0, 5.0]), np.array([1.0, 3.0, np.inf]), np.array([0.2, 0.5, 0.3])
-    )
-    x, risk = steps.steps()
-    np.testing.assert_allclose(x, [0, 1, 1, 3, 3])
-    np.testing.assert_allclose(risk, [0, 0, 0.2, 0.2, 0.7])
+    assert_allclose(x, [0, 1, 1, 3, 3])
+    assert_allclose(risk, [0, 0, 0.2, 0.2, 0.7])

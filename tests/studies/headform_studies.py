@@ -24,11 +24,10 @@ from numpy.typing import NDArray
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.figures import style
 from mcstudy.report import document
-from mcstudy.studyfile.config import parse_study
 from models.registry import load_model
 from studies import cli
 from studies import worker as evaluation
-from studies.api import PIPELINES
+from studies.kinds import KINDS, parse_study
 from studies.monte_carlo import study as monte_carlo
 from studies.morris import study as morris
 from studies.sensitivity import measure as sensitivity
@@ -114,11 +113,11 @@ def study_text(
 def run_text(text: str, folder: ResultsFolder, *, workers: int = 1) -> dict[str, Any]:
     """Run a study file of any sampled kind."""
     study = parse_study(text)
-    return PIPELINES[study.kind].run(study, text, folder, workers=workers, quiet=True)
+    return KINDS[study.kind].run(study, text, folder, workers=workers, quiet=True)
 
 
 def closed_form(
-    argument: Mapping[str, Any], rows: NDArray[np.float64]
+    argument: Mapping[str, Any], rows: NDArray[np.float64], started: object
 ) -> tuple[NDArray[np.float64], list[str]]:
     """Return what the headform model returns, by formula and at once, where only rows matter."""
     model = load_model(argument["name"], argument["options"])

@@ -13,10 +13,11 @@ import pytest
 
 from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder
-from mcstudy.studyfile.config import MonteCarloStudy, load_study
 from studies.api import run_study
 from studies.diagnosis import words
 from studies.diagnosis.study import diagnose
+from studies.kinds import load_study
+from studies.monte_carlo.schema import MonteCarloStudy
 from studies.validation.diagnosis.hidden_effects import Hidden, Laboratory, make_tests
 
 LABORATORY = Laboratory(tests=10)

@@ -36,7 +36,6 @@ from mcstudy.injury import association
 from mcstudy.injury.survival import RiskFit
 from mcstudy.measurement.isomme import read_test, write_test
 from mcstudy.measurement.measured_data import load_measured
-from mcstudy.studyfile.config import load_study
 from models.contact.corridor import build_corridor, corridor_text, load_corridors
 from models.contact.law import ForceCurve
 from models.registry import load_model
@@ -44,6 +43,7 @@ from studies import cli, stiffness
 from studies import paired_runs as cells
 from studies.diagnosis import study as diagnosis
 from studies.isomme_export import write_isomme
+from studies.kinds import load_study
 from studies.monte_carlo import study as monte_carlo
 from studies.morris import study as morris
 from studies.sobol import study as sobol

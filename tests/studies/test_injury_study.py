@@ -23,8 +23,6 @@ from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.injury import association
 from mcstudy.injury.functions import RiskFunction
-from mcstudy.studyfile import config
-from mcstudy.studyfile.config import InjuryStudy, parse_study
 from models.headform.model import HeadformModel
 from models.registry import load_model
 from studies import api
@@ -35,6 +33,9 @@ from studies.injury import speed as injury_speed
 from studies.injury import study as injury
 from studies.injury.analysis import analyse, outcomes_of
 from studies.injury.cells import cells_of
+from studies.injury.schema import InjuryStudy
+from studies.kinds import parse_study
+from studies.monte_carlo.design import sample_inputs
 from studies.runs import load_study_model
 
 Array = NDArray[np.float64]
@@ -280,7 +281,7 @@ def frame_of(text: str) -> tuple[InjuryStudy, pd.DataFrame, dict[str, RiskFuncti
     model = load_study_model(study)
     frames = []
     for part in cells_of(study):
-        columns = config.sample_inputs(part.study, model)
+        columns = sample_inputs(part.study, model)
         for name, value in part.changes.fixed.items():
             columns[name] = np.full(study.design.n, value.value)
         rows = np.stack([columns[item.name] for item in model.inputs], axis=1)
@@ -396,7 +397,7 @@ def test_inputs_of_the_cells_are_those_of_a_monte_carlo_study(full: ResultsFolde
                  "")
     )  # fmt: skip
     study = parse_study(text)
-    columns = config.sample_inputs(study, load_study_model(study))
+    columns = sample_inputs(study, load_study_model(study))
     runs = cell(full, "reference.sedan").runs()
     for name in ("impact_speed", "headform_mass", "hood_force_scale"):
         assert runs[name].to_numpy().tobytes() == columns[name].tobytes()

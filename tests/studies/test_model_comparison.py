@@ -12,11 +12,13 @@ from headform_studies import INPUTS, without_figures
 
 from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.results import ResultsFolder, digest
-from mcstudy.studyfile.config import ModelComparison, load_study, parse_study
 from models.registry import load_model
 from studies import api, cli
 from studies import listing as catalogue
-from studies.model_comparison.study import NOMINAL, build_report
+from studies.api import build_report
+from studies.kinds import load_study, parse_study
+from studies.model_comparison.schema import ModelComparison
+from studies.model_comparison.study import NOMINAL
 
 FACTOR = 2.0**0.75
 """HIC15 of a straight hood goes with the stiffness to the power of 0.75."""

@@ -7,10 +7,11 @@ import pytest
 
 from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.results import ResultsFolder, digest
-from mcstudy.studyfile.config import MonteCarloStudy, parse_study
 from models.registry import load_model
-from studies.api import rerun
-from studies.monte_carlo.study import build_report, run_monte_carlo
+from studies.api import build_report, rerun
+from studies.kinds import parse_study
+from studies.monte_carlo.schema import MonteCarloStudy
+from studies.monte_carlo.study import MonteCarlo
 
 SMALL = (
     Path("configs/paper_study.toml")
@@ -30,7 +31,7 @@ def load(text: str = SMALL) -> MonteCarloStudy:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> ResultsFolder:
     results = ResultsFolder(tmp_path_factory.mktemp("results") / "small")
-    run_monte_carlo(load(), SMALL, results, workers=2, quiet=True)
+    MonteCarlo().run(load(), SMALL, results, workers=2, quiet=True)
     return results
 
 
@@ -61,7 +62,7 @@ def test_digest_is_the_same_for_any_number_of_workers(
     folder: ResultsFolder, tmp_path: Path, workers: int
 ) -> None:
     other = ResultsFolder(tmp_path / "other")
-    run_monte_carlo(load(), SMALL, other, workers=workers, quiet=True)
+    MonteCarlo().run(load(), SMALL, other, workers=workers, quiet=True)
     assert other.read_json("manifest.json")["digest"] == folder.read_json("manifest.json")["digest"]
 
 
@@ -71,20 +72,20 @@ def test_digest_is_the_same_after_an_interruption(folder: ResultsFolder, tmp_pat
     with part.open_for_writing():
         part.write_json("manifest.json", manifest | {"finished": False})
         part.add_part(folder.runs().iloc[5:11])
-    run_monte_carlo(load(), SMALL, part, workers=2, quiet=True)
+    MonteCarlo().run(load(), SMALL, part, workers=2, quiet=True)
     assert part.read_json("manifest.json")["digest"] == manifest["digest"]
 
 
 def test_the_same_command_again_runs_nothing_anew(folder: ResultsFolder) -> None:
     before = (folder.path / "runs.parquet").read_bytes()
-    run_monte_carlo(load(), SMALL, folder, workers=2, quiet=True)
+    MonteCarlo().run(load(), SMALL, folder, workers=2, quiet=True)
     assert (folder.path / "runs.parquet").read_bytes() == before
 
 
 def test_another_study_does_not_mix_with_it(folder: ResultsFolder) -> None:
     other = SMALL.replace("mean = 42.0", "mean = 43.0")
     with pytest.raises(UserError, match=r"differs in inputs\.impact_speed"):
-        run_monte_carlo(load(other), other, folder, quiet=True)
+        MonteCarlo().run(load(other), other, folder, quiet=True)
 
 
 def test_report_is_rebuilt_from_the_folder_alone(folder: ResultsFolder) -> None:
@@ -132,7 +133,7 @@ def test_too_many_failures_stop_the_study(tmp_path: Path) -> None:
     assert text != SMALL
     results = ResultsFolder(tmp_path / "beside")
     with pytest.raises(StudyError, match="24 no_contact"):
-        run_monte_carlo(load(text), text, results, workers=2, quiet=True)
+        MonteCarlo().run(load(text), text, results, workers=2, quiet=True)
     assert len(results.runs()) == 24
 
 
@@ -142,6 +143,6 @@ def test_every_design_runs(tmp_path: Path) -> None:
         lines = [size if line.startswith("replicate_size") else line for line in text.splitlines()]
         text = "\n".join(lines).replace("n = 24", "n = 8")
         results = ResultsFolder(tmp_path / method)
-        analysis = run_monte_carlo(load(text), text, results, workers=2, quiet=True)
+        analysis = MonteCarlo().run(load(text), text, results, workers=2, quiet=True)
         assert analysis["runs"] == 8
         assert np.isfinite(analysis["outputs"]["hic15"]["mean"]["value"])

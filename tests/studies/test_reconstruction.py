@@ -8,9 +8,10 @@ import pytest
 from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.measurement.isomme import read_test
-from mcstudy.studyfile.config import Reconstruction, load_study, parse_study
 from models.criteria import head_injury_criterion
-from studies.reconstruction import reconstruct, write_reconstruction
+from studies.kinds import load_study, parse_study
+from studies.reconstruction.schema import Reconstruction
+from studies.reconstruction.study import reconstruct, write_reconstruction
 
 CASE = Path("configs/paper_case.toml")
 

@@ -15,13 +15,15 @@ from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.measurement.isomme import write_test
 from mcstudy.measurement.measured_data import load_measured
-from mcstudy.studyfile.config import MonteCarloStudy, hash_of, load_study, numbers_digest
+from mcstudy.studyfile.identity import hash_of, numbers_digest
 from models.contact.corridor import load_corridors
 from models.protocol import OK
 from models.registry import load_model
 from scripts import example_tests
 from studies import cli
 from studies.api import rerun, run_case, run_study
+from studies.kinds import load_study
+from studies.monte_carlo.schema import MonteCarloStudy
 from studies.runs import load_study_model
 from studies.stiffness import fit_stiffness_of
 

@@ -11,9 +11,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from mcstudy.studyfile import config
-from mcstudy.studyfile.config import MonteCarloStudy, load_study
+from mcstudy.studyfile.study_inputs import map_inputs
 from models.registry import load_model
+from studies.kinds import load_study
+from studies.monte_carlo.schema import MonteCarloStudy
 from studies.validation.diagnosis.hidden_effects import Hidden
 
 Array = NDArray[np.float64]
@@ -39,7 +40,7 @@ def make_accidents(
     assert isinstance(study, MonteCarloStudy)
     model = load_model(study.model.name, study.model.options)
     spare = 2 * accidents
-    columns = config.map_inputs(study, model, rng.random((spare, len(study.inputs))))
+    columns = map_inputs(study, model, rng.random((spare, len(study.inputs))))
     altered = alter({k: v.copy() for k, v in columns.items()}, hidden)
     names = [item.name for item in model.inputs]
     batch = model.run_batch(np.stack([altered[name] for name in names], axis=1))

@@ -1,21 +1,21 @@
 """The reconstruction: one run, printed beside published tables and drawn."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from mcstudy import units
 from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.figures import crash, stiffness, style
 from mcstudy.report import Section, Table, render
-from mcstudy.studyfile import config
-from mcstudy.studyfile.config import ComparisonTable, Reconstruction
-from mcstudy.text import number, quantity, unit
+from mcstudy.studyfile.study_inputs import fixed_values
+from mcstudy.studyfile.study_outputs import check_outputs
+from mcstudy.text import quantity
 from models.protocol import Model, Run, complete_status
 from studies.isomme_export import write_isomme
+from studies.published_tables import PublishedTable, as_table, compare_with_table
+from studies.reconstruction.schema import Reconstruction
 from studies.runs import load_study_model
 
 PRIMARY = 0.12
@@ -54,23 +54,14 @@ _VIEWS = {
 }
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """A published table with our rows: title, head, rows of numbers, the last ones ours."""
-
-    title: str
-    head: list[str]
-    rows: list[tuple[str, list[float | None]]]
-
-
-def reconstruct(study: Reconstruction) -> tuple[Run, list[Comparison]]:
+def reconstruct(study: Reconstruction) -> tuple[Run, list[PublishedTable]]:
     """Run the study's case once.
 
     Returns
     -------
     run : Run
         With histories and scene.
-    tables : list of Comparison
+    tables : list of PublishedTable
 
     Raises
     ------
@@ -80,9 +71,9 @@ def reconstruct(study: Reconstruction) -> tuple[Run, list[Comparison]]:
         If the run failed.
     """
     model = load_study_model(study)
-    values = config.fixed_values(study, model)
+    values = fixed_values(study.fixed, model)
     for k, table in enumerate(study.tables):
-        config.check_outputs(list(table.units), model, f"tables[{k}].units")
+        check_outputs(list(table.units), model, f"tables[{k}].units")
         for j, row in enumerate(table.rows):
             unknown = sorted(set(row.values) - set(table.units))
             if unknown:
@@ -93,35 +84,6 @@ def reconstruct(study: Reconstruction) -> tuple[Run, list[Comparison]]:
     si = {item.name: item.unit for item in model.outputs}
     ours = {"this run": run.outputs}
     return run, [compare_with_table(table, ours, si) for table in study.tables]
-
-
-def compare_with_table(
-    table: ComparisonTable, ours: Mapping[str, Mapping[str, float]], si: Mapping[str, str]
-) -> Comparison:
-    """Return a published table with rows of our own below it.
-
-    Parameters
-    ----------
-    table : as in a study file. ours : outputs in SI units by label of the row.
-    si : unit of each output.
-
-    Raises
-    ------
-    UserError
-        If a unit does not fit.
-    """
-    names = list(table.units)
-    try:
-        scale = {name: units.factor(si[name], table.units[name]) for name in names}
-    except ValueError as error:
-        raise UserError(f"tables {table.title!r}: {error}") from None
-    rows: list[tuple[str, list[float | None]]] = [
-        (row.label, [row.values.get(name) for name in names]) for row in table.rows
-    ]
-    for label, outputs in ours.items():
-        rows.append((label, [outputs[k] * scale[k] if k in outputs else None for k in names]))
-    head = [f"{style.words(n)} [{unit(table.units[n]) or '–'}]" for n in names]
-    return Comparison(table.title, head, rows)
 
 
 def draw(study: Reconstruction, run: Run) -> dict[str, Any]:
@@ -163,7 +125,7 @@ def draw(study: Reconstruction, run: Run) -> dict[str, Any]:
 
 
 def write_reconstruction(
-    study: Reconstruction, text: str, run: Run, tables: list[Comparison], folder: ResultsFolder
+    study: Reconstruction, text: str, run: Run, tables: list[PublishedTable], folder: ResultsFolder
 ) -> None:
     """Write the results folder of a reconstruction: outputs, histories, figures, GIF, report."""
     model = load_study_model(study)
@@ -197,7 +159,7 @@ def _report(
     study: Reconstruction,
     model: Model,
     run: Run,
-    tables: list[Comparison],
+    tables: list[PublishedTable],
     figures: dict[str, Any],
     animations: dict[str, bytes],
 ) -> str:
@@ -247,12 +209,3 @@ def _work(run: Run) -> dict[str, dict[str, float]]:
     if "work" not in run.histories:
         return {}
     return {"work": {k: float(v[0]) for k, v in run.histories["work"].channels.items()}}
-
-
-def as_table(comparison: Comparison) -> Table:
-    """Return a comparison as a table of text."""
-    return Table(
-        comparison.title,
-        ["", *comparison.head],
-        [[label, *(number(value, 4) for value in values)] for label, values in comparison.rows],
-    )

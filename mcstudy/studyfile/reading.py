@@ -1,0 +1,94 @@
+"""Study files: TOML, checked before anything runs."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+
+from mcstudy.errors import UserError, on_one_line
+from mcstudy.files import parse_toml
+
+Study = TypeVar("Study")
+
+LONGEST = 200
+"""Characters of a message, above which it is cut."""
+_MIXED = {"options": "a text, a number or a list of pairs of numbers",
+          "fixed": "a number or a list of pairs of numbers"}  # fmt: skip
+"""What the tables hold whose values may be of several types."""
+
+
+def check_study(text: str, source: str, kinds: TypeAdapter[Study]) -> Study:
+    """Check the text of a study file.
+
+    Parameters
+    ----------
+    text : str
+        TOML.
+    source : str
+        Where it comes from, for messages.
+    kinds : TypeAdapter
+        Of the kinds of study that it may be.
+
+    Raises
+    ------
+    UserError
+        If something in it is wrong; the message names the source and the place in it.
+    """
+    table = parse_toml(text, source)
+    try:
+        return kinds.validate_python(table)
+    except ValidationError as error:
+        raise UserError(f"{source}: {first_problem(error, table)}") from None
+
+
+def first_problem(error: ValidationError, table: Mapping[str, Any]) -> str:
+    """Return the first problem of a table, on one line, with its place in the file.
+
+    Parameters
+    ----------
+    error : of the check. table : as it was read.
+    """
+    problem = error.errors(include_url=False)[0]
+    kind = problem["type"]
+    parts, typed = _place_in(table, problem["loc"], missing=kind == "missing")
+    place = on_one_line(".".join(parts) or "study", LONGEST)
+    mixed = next((part for part in parts if part in _MIXED), None)
+    if mixed is not None and typed >= parts.index(mixed) + 2:
+        place = on_one_line(".".join(parts[: parts.index(mixed) + 2]), LONGEST)
+        return f"{place}: must be {_MIXED[mixed]}"
+    if kind == "extra_forbidden":
+        return f"{place}: unknown key"
+    if kind == "missing":
+        return f"{place}: missing"
+    message = on_one_line(problem["msg"].removeprefix("Value error, "), LONGEST)
+    given = problem.get("input")
+    shown = (
+        f" (given {on_one_line(repr(given), 60)})" if isinstance(given, str | int | float) else ""
+    )
+    return f"{place}: {message}{shown}"
+
+
+def _place_in(
+    table: Any, location: tuple[int | str, ...], *, missing: bool
+) -> tuple[list[str], int]:
+    """Return the parts of a location that the file has, and after how many another stood last.
+
+    Pydantic puts the chosen kind of study and of distribution into a location, and the type that
+    it tried; the file does not have them. What is missing is the last part.
+    """
+    parts: list[str] = []
+    other = 0
+    for k, part in enumerate(location):
+        inside = (
+            part in table
+            if isinstance(table, Mapping)
+            else isinstance(table, Sequence) and isinstance(part, int) and part < len(table)
+        )
+        if inside:
+            table = table[part]
+            parts.append(str(part))
+        elif missing and k == len(location) - 1:
+            parts.append(str(part))
+        else:
+            other = len(parts)
+    return parts, other

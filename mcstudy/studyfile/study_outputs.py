@@ -1,0 +1,36 @@
+"""The outputs that a study reports."""
+
+from collections.abc import Sequence
+
+from mcstudy.errors import UserError
+from mcstudy.simulator import Simulator
+from mcstudy.studyfile.schema import SampledStudy
+
+USUAL_OUTPUTS = ("hic15", "throw_distance", "wad")
+
+
+def report_outputs(study: SampledStudy, model: Simulator) -> list[str]:
+    """Return the outputs that a study's report draws.
+
+    Raises
+    ------
+    UserError
+        If the model lacks one of them.
+    """
+    if study.reported is None:
+        known = [item.name for item in model.outputs]
+        return [name for name in USUAL_OUTPUTS if name in known] or known[:3]
+    check_outputs(study.reported, model, "report.outputs")
+    return study.reported
+
+
+def check_outputs(names: Sequence[str], model: Simulator, place: str) -> None:
+    """Raise ``UserError`` if the model lacks one of the outputs, or one is named twice."""
+    known = [item.name for item in model.outputs]
+    for name in names:
+        if names.count(name) > 1:
+            raise UserError(f"{place}: names {name!r} twice")
+        if name not in known:
+            raise UserError(
+                f"{place}: model {model.name!r} has no output {name!r}; it has {', '.join(known)}"
+            )

@@ -1,0 +1,164 @@
+"""What every kind of study does alike: check, lock, run, analyse, publish, summarise.
+
+A kind of study is one folder: its study file (``schema.py``), its plan, analysis, figures and
+sections as a subclass of ``StudyKind``, and one line in ``studies.kinds``.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Generic, TypeVar
+
+from mcstudy.errors import UserError
+from mcstudy.execution.results import ResultsFolder
+from mcstudy.execution.workers import Workers
+from mcstudy.report import Section, Table
+from mcstudy.studyfile.schema import AnyStudy
+from studies.publishing import publish
+
+Study = TypeVar("Study", bound=AnyStudy)
+Plan = TypeVar("Plan")
+Results = TypeVar("Results")
+
+
+class StudyKind(ABC, Generic[Study, Plan, Results]):
+    """A kind of study whose runs are kept in a results folder.
+
+    Attributes
+    ----------
+    schema : class of its study file.
+    """
+
+    schema: ClassVar[type[AnyStudy]]
+
+    def run(
+        self,
+        study: Study,
+        text: str,
+        folder: ResultsFolder,
+        *,
+        workers: Workers = -1,
+        quiet: bool = False,
+    ) -> dict[str, Any]:
+        """Run a study, or go on with it, and write its results folder.
+
+        Parameters
+        ----------
+        study : AnyStudy
+        text : str
+            The study file as written.
+        folder : ResultsFolder
+        workers : int or str
+            Processes, -1 for one a core, or the address of a dask scheduler.
+        quiet : bool
+            No progress line.
+
+        Returns
+        -------
+        dict
+            The analysis, as in ``analysis.json``.
+
+        Raises
+        ------
+        UserError
+            If the study does not fit the model or the folder.
+        StudyError
+            If too many runs failed.
+        """
+        plan = self.plan(study, folder)
+        with folder.open_for_writing():
+            folder.write_text("study.toml", text)
+            self.execute(study, plan, folder, workers=workers, quiet=quiet)
+            return self.build_report(study, folder)
+
+    def build_report(self, study: Study, folder: ResultsFolder) -> dict[str, Any]:
+        """Analyse a results folder and write its figures and report, without running the model.
+
+        Parameters
+        ----------
+        study : AnyStudy
+            As its folder holds it.
+        folder : ResultsFolder
+
+        Raises
+        ------
+        UserError
+            If the folder holds too few runs yet.
+        StudyError
+            If too many runs failed.
+        """
+        results = self.results(study, folder)
+        analysis = self.analyse(study, results)
+        return publish(
+            folder,
+            study.title,
+            self.subtitle(study, results, analysis),
+            analysis,
+            lambda held: self.draw(study, results, held),
+            lambda held, figures: self.sections(study, results, held, figures),
+        )
+
+    @abstractmethod
+    def plan(self, study: Study, folder: ResultsFolder) -> Plan:
+        """Return what is to be run: models, checked, and the values of their inputs.
+
+        Raises
+        ------
+        UserError
+            If the study does not fit the model, or the folder is another study's.
+        """
+
+    @abstractmethod
+    def execute(
+        self, study: Study, plan: Plan, folder: ResultsFolder, *, workers: Workers, quiet: bool
+    ) -> None:
+        """Run what is missing of a plan; the folder is open for writing."""
+
+    @abstractmethod
+    def results(self, study: Study, folder: ResultsFolder) -> Results:
+        """Return what a folder holds for the analysis."""
+
+    @abstractmethod
+    def analyse(self, study: Study, results: Results) -> dict[str, Any]:
+        """Return every number that the report prints."""
+
+    @abstractmethod
+    def subtitle(self, study: Study, results: Results, analysis: Mapping[str, Any]) -> str:
+        """Return the line below the report's title."""
+
+    @abstractmethod
+    def draw(
+        self, study: Study, results: Results, analysis: Mapping[str, Any]
+    ) -> Mapping[str, Any]:
+        """Return the figures by file name."""
+
+    @abstractmethod
+    def sections(
+        self,
+        study: Study,
+        results: Results,
+        analysis: Mapping[str, Any],
+        figures: Mapping[str, Any],
+    ) -> Sequence[Section]:
+        """Return the sections of the report."""
+
+    @abstractmethod
+    def summarise(self, analysis: Mapping[str, Any]) -> list[str] | list[Table]:
+        """Return what the command line prints of an analysis, paragraphs or tables."""
+
+    def independent_rows(self, runs: Any, folder: ResultsFolder) -> Any:
+        """Return the rows of a table of runs that are an independent sample of the inputs.
+
+        Raises
+        ------
+        UserError
+            If the design is no sample of the inputs.
+        """
+        raise UserError(
+            f"{folder.path}: is the folder of a study of kind {self.name}; sensitivity is "
+            "measured in those of Monte Carlo and Sobol' studies"
+        )
+
+    @property
+    def name(self) -> str:
+        """Name of the kind in study files."""
+        return str(self.schema.model_fields["kind"].annotation.__args__[0])  # type: ignore[union-attr]

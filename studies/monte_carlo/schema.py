@@ -1,0 +1,25 @@
+"""The study file of a Monte Carlo study."""
+
+from typing import Any, Literal
+
+from mcstudy.studyfile.schema import Design, Report, SampledStudy
+
+
+class MonteCarloStudy(SampledStudy):
+    """``kind = "monte-carlo"``: sample inputs, run, describe the outputs."""
+
+    kind: Literal["monte-carlo"]
+    design: Design = Design()
+    report: Report = Report()
+
+    @property
+    def reported(self) -> list[str] | None:
+        """Outputs that the study names for its report, if it names any."""
+        return self.report.outputs
+
+    def design_topics(self) -> dict[str, Any]:
+        """Return what of the design changes the numbers of a run, by topic."""
+        return {
+            "design.method": self.design.method,
+            "design.replicate_size": self.design.size,
+        }

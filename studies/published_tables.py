@@ -1,0 +1,57 @@
+"""Published tables with rows of our own beside theirs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from mcstudy import units
+from mcstudy.errors import UserError
+from mcstudy.figures import style
+from mcstudy.report import Table
+from mcstudy.studyfile.schema import ComparisonTable
+from mcstudy.text import number, unit
+
+
+@dataclass(frozen=True)
+class PublishedTable:
+    """A published table with our rows: title, head, rows of numbers, the last ones ours."""
+
+    title: str
+    head: list[str]
+    rows: list[tuple[str, list[float | None]]]
+
+
+def compare_with_table(
+    table: ComparisonTable, ours: Mapping[str, Mapping[str, float]], si: Mapping[str, str]
+) -> PublishedTable:
+    """Return a published table with rows of our own below it.
+
+    Parameters
+    ----------
+    table : as in a study file. ours : outputs in SI units by label of the row.
+    si : unit of each output.
+
+    Raises
+    ------
+    UserError
+        If a unit does not fit.
+    """
+    names = list(table.units)
+    try:
+        scale = {name: units.factor(si[name], table.units[name]) for name in names}
+    except ValueError as error:
+        raise UserError(f"tables {table.title!r}: {error}") from None
+    rows: list[tuple[str, list[float | None]]] = [
+        (row.label, [row.values.get(name) for name in names]) for row in table.rows
+    ]
+    for label, outputs in ours.items():
+        rows.append((label, [outputs[k] * scale[k] if k in outputs else None for k in names]))
+    head = [f"{style.words(n)} [{unit(table.units[n]) or '–'}]" for n in names]
+    return PublishedTable(table.title, head, rows)
+
+
+def as_table(published: PublishedTable) -> Table:
+    """Return a published table as text: outputs as rows, sources as columns."""
+    labels = [label for label, _ in published.rows]
+    columns = [[number(value, 4) for value in values] for _, values in published.rows]
+    rows = [list(row) for row in zip(published.head, *columns, strict=True)]
+    return Table(published.title, ["", *labels], rows)

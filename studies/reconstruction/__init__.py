@@ -1,0 +1,1 @@
+"""The reconstruction: one run, printed beside published tables and drawn."""

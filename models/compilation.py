@@ -110,6 +110,15 @@ if "NUMBA_CACHE_DIR" not in os.environ:
             os.environ["NUMBA_CACHE_DIR"] = str(_folder)
 
 
+MERGED_FLAGS: Any = {
+    "error_model": "numpy",
+    "fastmath": {"contract"},
+    "forceinline": True,
+    "_nrt": False,
+}
+"""Numba flags of what is merged into a kernel without being one."""
+
+
 def _compile(
     function: Callable[..., Any], *, inline: bool = False, fuse: bool = True
 ) -> Callable[..., Any]:

@@ -19,9 +19,9 @@ from models.crash.surfaces import (
 
 
 @inlined_kernel
-def apply_road_contacts(zones, ellipsoids, road_surface, motion, loads, contacts, tree, power):
+def apply_road_contacts(ellipsoids, road_surface, motion, loads, contacts, tree, power):
     """Add the loads of the road, the plane z = 0, on all segments."""
-    road = zones.radius.shape[0]
+    road = contacts.zone_force.shape[0] - 1
     for i in range(tree.mass.shape[0]):
         contacts.segment_force[i, road] = 0.0
         if contacts.centre[i, 2] > ellipsoids.reach[i]:

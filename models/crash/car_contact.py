@@ -1,7 +1,7 @@
-"""Contact of the segments with the zones of the car front.
+"""Contact of the segments with the car's front, whatever its geometry is.
 
-At its borders a zone fades, so that a segment passes from the hood edge to the hood with one
-contact's worth of force.
+The front answers where and how deep (``models.crash.front``); the law of the region gives the
+force; the segment is loaded; the front takes the reaction.
 """
 
 import math
@@ -9,7 +9,15 @@ import math
 from models.compilation import inlined_kernel
 from models.contact.dent import ploughing_coefficient, pressure_share
 from models.contact.friction import friction_coefficient
-from models.contact.geometry import roll_direction
+from models.crash.front import (
+    are_joined,
+    friction_of,
+    is_near,
+    patch_count,
+    ploughing_of,
+    react,
+    separation_of,
+)
 from models.crash.surfaces import (
     CAR_NORMAL,
     CONTACT_DAMPING,
@@ -21,108 +29,13 @@ from models.crash.surfaces import (
     push,
     shape_of,
 )
-from models.vehicle.zones import MAXIMUM_DEPTH, ROLL
 
-BORDER = 0.04
-"""Length (m) over which a zone fades at its borders (assumed)."""
-ARC_BORDER = 0.15
-"""Angle (rad) over which a roll fades at the ends of its arc (assumed)."""
 ENTRY_DEPTH = 0.03
 """Depth (m) within which a segment must first be seen by a zone; deeper, it came past the border
 (beside the fender, from under the bumper) and is not in contact (assumed, ten times the way of a
 step), unless a zone that shares a border hands it over."""
 HANDED_DEEPER = 0.005
 """Depth (m) by which a segment handed over may be deeper than it was before (assumed)."""
-
-
-@inlined_kernel
-def _fade(x, border):
-    return min(max(x / border + 0.5, 0.0), 1.0)
-
-
-@inlined_kernel
-def zone_separation(zones, ellipsoids, contacts, j, i, cx, cy, cz, cosine, sine):
-    """Return separation, normal, contact point (car frame) and border weight.
-
-    Parameters
-    ----------
-    j, i : zone and segment. cx, cy, cz : m, ellipsoid centre in the car's frame.
-    cosine, sine : of the car's yaw.
-
-    Returns
-    -------
-    tuple of float
-        ``(separation, nx, ny, nz, px, py, pz, weight)``; a separation of 1.0 m stands for
-        "far away" and comes with weight 0.
-    """
-    half_width = zones.half_width[j]
-    reach = ellipsoids.reach[i]
-    inner = zones.inner[j]
-    if abs(cy) > half_width + reach + BORDER or abs(cy) < inner - reach - BORDER:
-        return 1.0, 1.0, 0.0, 0.0, cx, cy, cz, 0.0
-    y = min(max(cy, -zones.bend[j]), zones.bend[j])
-    bend = zones.curvature[j] * y
-    shift = 0.5 * bend * y
-    # Horizontal normal e = (ex, ey) of the bent zone; its axis runs along (-ey, ex).
-    ex = 1.0 / math.sqrt(1.0 + bend * bend)
-    ey = bend * ex
-    d1 = (cx - zones.origin[j, 0] + shift) * ex
-    d3 = cz - zones.origin[j, 1]
-    if zones.kind[j] == ROLL:
-        limit = zones.radius[j] + reach
-        if d1 * d1 + d3 * d3 > limit * limit:
-            return 1.0, 1.0, 0.0, 0.0, cx, cy, cz, 0.0
-    else:
-        n1, n3 = -zones.direction[j, 1], zones.direction[j, 0]
-        if n3 < 0.0 or (n3 == 0.0 and n1 < 0.0):
-            n1, n3 = -n1, -n3
-        above = n1 * d1 + n3 * d3
-        along = zones.direction[j, 0] * d1 + zones.direction[j, 1] * d3
-        if (
-            above > reach
-            or above < -MAXIMUM_DEPTH
-            or along < -reach - BORDER
-            or along > zones.length[j] + reach + BORDER
-        ):
-            return 1.0, 1.0, 0.0, 0.0, cx, cy, cz, 0.0
-    # Shape matrix in car axes: turn the segment's world axes by minus the yaw.
-    A = shape_of(contacts, i)
-    # World components of the car-frame direction (ex, ey, 0).
-    gx, gy = cosine * ex - sine * ey, sine * ex + cosine * ey
-    p11 = gx * (A[0] * gx + A[1] * gy) + gy * (A[1] * gx + A[3] * gy)
-    p13 = gx * A[2] + gy * A[4]
-    p33 = A[5]
-    if zones.kind[j] == ROLL:
-        n1, n3, separation = roll_direction(d1, d3, p11, p13, p33)
-        separation -= zones.radius[j]
-    else:
-        separation = (
-            n1 * d1 + n3 * d3 - math.sqrt(p11 * n1 * n1 + 2.0 * p13 * n1 * n3 + p33 * n3 * n3)
-        )
-    # Deepest point of the ellipsoid: centre - A n / h, in car axes.
-    nwx, nwy = n1 * gx, n1 * gy
-    ax = A[0] * nwx + A[1] * nwy + A[2] * n3
-    ay = A[1] * nwx + A[3] * nwy + A[4] * n3
-    az = A[2] * nwx + A[4] * nwy + A[5] * n3
-    h = math.sqrt(ax * nwx + ay * nwy + az * n3)
-    px = cx - (cosine * ax + sine * ay) / h
-    py = cy - (-sine * ax + cosine * ay) / h
-    pz = cz - az / h
-    weight = _fade(half_width - abs(py), BORDER)
-    if inner > 0.0:
-        weight *= _fade(abs(py) - inner, BORDER)
-    if zones.kind[j] == ROLL:
-        angle = math.atan2(n3, n1)
-        weight *= _fade(angle - zones.arc[j, 0], ARC_BORDER)
-        weight *= _fade(zones.arc[j, 1] - angle, ARC_BORDER)
-    else:
-        q1 = (px - zones.origin[j, 0] + 0.5 * zones.curvature[j] * py * py) * ex
-        q3 = pz - zones.origin[j, 1]
-        along = zones.direction[j, 0] * q1 + zones.direction[j, 1] * q3
-        weight *= _fade(along, BORDER) * _fade(zones.length[j] - along, BORDER)
-        if separation < -MAXIMUM_DEPTH:
-            weight = 0.0
-    return separation, n1 * ex, n1 * ey, n3, px, py, pz, weight
 
 
 @inlined_kernel
@@ -151,14 +64,14 @@ def _plough(
 
 
 @inlined_kernel
-def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, power):
-    """Add the loads of the car on all segments.
+def apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, power):
+    """Add the loads of the car on all segments, and the reactions on its front.
 
     ``car`` is (6,): x, y of the frame's origin (m), yaw (rad) and their rates; see
     ``models.vehicle.motion``.
     """
     cosine, sine = math.cos(car[2]), math.sin(car[2])
-    count = zones.radius.shape[0]
+    count = patch_count(front)
     for i in range(tree.mass.shape[0]):
         wx, wy = contacts.centre[i, 0] - car[0], contacts.centre[i, 1] - car[1]
         cx, cy = cosine * wx + sine * wy, -sine * wx + cosine * wy
@@ -179,15 +92,10 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
         for j in range(count):
             engaged = contacts.engaged[i, j]
             contacts.engaged[i, j] = False
-            if (
-                cx > zones.box[j, 1] + reach
-                or cx < zones.box[j, 0] - reach
-                or cz > zones.box[j, 3] + reach
-                or cz < zones.box[j, 2] - reach
-            ):
+            if not is_near(front, j, reach, cx, cz):
                 continue
-            separation, nx, ny, nz, px, py, pz, weight = zone_separation(
-                zones, ellipsoids, contacts, j, i, cx, cy, cz, cosine, sine
+            separation, nx, ny, nz, px, py, pz, weight, region = separation_of(
+                front, ellipsoids, contacts, j, i, cx, cy, cz, cosine, sine
             )
             if separation >= 0.0 or weight == 0.0:
                 continue
@@ -196,14 +104,14 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
                 # A dent that slides across a border is as deep on its other side.
                 deepest = 0.0
                 for k in range(count):
-                    if zones.joined[j, k] and contacts.engaged[i, k]:
+                    if are_joined(front, j, k) and contacts.engaged[i, k]:
                         deepest = max(deepest, contacts.largest[i, k])
                 if penetration > deepest + HANDED_DEEPER:
                     continue
             contacts.engaged[i, j] = True
             if penetration > contacts.largest[i, j]:
                 contacts.largest[i, j] = penetration
-            law = ellipsoids.surface_law[i, j]
+            law = ellipsoids.surface_law[i, region]
             dent = law_surface(ellipsoids, law, penetration)
             support = nx * (cx - px) + ny * (cy - py) + nz * (cz - pz)
             share = pressure_share(penetration - dent, dent, support)
@@ -224,18 +132,18 @@ def apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, po
                 continue
             tx, ty, tz = ux + rate * mx, uy + rate * my, vz + rate * nz
             c = friction_coefficient(
-                zones.friction[j], normal, tx * tx + ty * ty + tz * tz, tree.mass[i]
+                friction_of(front, region), normal, tx * tx + ty * ty + tz * tz, tree.mass[i]
             )
-            push(
-                motion, loads, i, qx, qy, bz,
-                normal * mx - c * tx, normal * my - c * ty, normal * nz - c * tz,
-            )  # fmt: skip
+            fx, fy, fz = normal * mx - c * tx, normal * my - c * ty, normal * nz - c * tz
+            push(motion, loads, i, qx, qy, bz, fx, fy, fz)
+            react(front, j, bx, by, bz, -fx, -fy, -fz)
             approach = vx * mx + vy * my + vz * nz
             power[CAR_NORMAL] += elastic * approach
             power[CONTACT_DAMPING] += viscous * approach
             power[FRICTION] -= c * (tx * vx + ty * vy + tz * vz)
-            if zones.ploughing[j] > 0.0:
-                resistance = zones.ploughing[j] * normal
+            ploughing = ploughing_of(front, region)
+            if ploughing > 0.0:
+                resistance = ploughing * normal
                 _plough(
                     motion, loads, contacts, power, tree, car, i, mx, my, nz,
                     resistance, support, dent,

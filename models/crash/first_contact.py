@@ -4,7 +4,7 @@ import numpy as np
 
 from models.compilation import kernel
 from models.contact.geometry import ellipsoid_direction
-from models.crash.car_contact import zone_separation
+from models.crash.front import patch_count, separation_of
 from models.crash.surfaces import shape_of
 
 SEARCH_AHEAD = 1.5
@@ -35,30 +35,30 @@ def widen_gaps(ellipsoids, contacts):
 
 
 @kernel
-def _touches(zones, ellipsoids, contacts, shift):
+def _touches(front, ellipsoids, contacts, shift):
     for i in range(ellipsoids.reach.shape[0]):
         if ellipsoids.surface_law[i, 0] < 0:
             continue
         x, y, z = contacts.centre[i, 0] + shift, contacts.centre[i, 1], contacts.centre[i, 2]
-        for j in range(zones.radius.shape[0]):
-            found = zone_separation(zones, ellipsoids, contacts, j, i, x, y, z, 1.0, 0.0)
+        for j in range(patch_count(front)):
+            found = separation_of(front, ellipsoids, contacts, j, i, x, y, z, 1.0, 0.0)
             if found[0] < 0.0 and found[7] > 0.0:
                 return True
     return False
 
 
 @kernel
-def first_contact_shift(zones, ellipsoids, contacts):
+def first_contact_shift(front, ellipsoids, contacts):
     """Return the shift in x (m) that makes the body just touch the car, or NaN."""
     clear, step = SEARCH_AHEAD, 0.02
-    while not _touches(zones, ellipsoids, contacts, clear - step):
+    while not _touches(front, ellipsoids, contacts, clear - step):
         clear -= step
         if clear < SEARCH_BEHIND:
             return np.nan
     low, high = clear - step, clear
     for _ in range(40):
         middle = 0.5 * (low + high)
-        if _touches(zones, ellipsoids, contacts, middle):
+        if _touches(front, ellipsoids, contacts, middle):
             low = middle
         else:
             high = middle

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.crash import outcome
-from models.crash.record import END_REASONS, R_ZONES, S_REASON
+from models.crash.record import END_REASONS, Column, Frame, Summary
 from models.declaration import run_rows
 from models.effects.chain import build_chain
 from models.pedestrian.anthropometry import SEGMENTS, is_possible
@@ -69,8 +69,8 @@ class CrashModel(ABC):
         self.tick = float(tick)
         self._chain = build_chain(self.name, effects)
         n, zones = len(SEGMENTS), len(self.vehicle.zones)
-        self._record = np.zeros((int(TIME_LIMIT / self.tick) + 2, R_ZONES + zones + 1))
-        self._frames = np.zeros((int(TIME_LIMIT / FRAME_INTERVAL) + 2, 4 + 7 * n))
+        self._record = np.zeros((int(TIME_LIMIT / self.tick) + 2, Column.REGION_FORCE + zones + 1))
+        self._frames = np.zeros((int(TIME_LIMIT / FRAME_INTERVAL) + 2, Frame.POSES + 7 * n))
 
     @property
     def inputs(self) -> tuple[Input, ...]:
@@ -148,7 +148,7 @@ class CrashModel(ABC):
             return Run(values, raw, raw, self._empty(outputs))
         signals = outcome.Signals(raw)
         status, measured = self._judge(raw, signals, outputs)
-        reason = END_REASONS[int(raw.summary[S_REASON])]
+        reason = END_REASONS[int(raw.summary[Summary.END_REASON])]
         histories = outcome.histories(raw, signals, channels)
         return Run(
             values, status, reason, measured, histories, outcome.scene(raw) if scene else None
@@ -170,7 +170,7 @@ class CrashModel(ABC):
     ) -> tuple[str, dict[str, float]]:
         """Return the status of a run and its outputs, or those that are wanted."""
         outputs = self._empty(wanted)
-        reason = END_REASONS[int(raw.summary[S_REASON])]
+        reason = END_REASONS[int(raw.summary[Summary.END_REASON])]
         if not reason.startswith("rest"):
             return reason, outputs
         measures = outcome.measures(raw, signals)

@@ -9,21 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.contact.law import SURFACE, interpolate_law
-from models.crash.record import (
-    R_ACCELERATION,
-    R_CENTRE,
-    R_HEAD_CAR,
-    R_HEAD_ROAD,
-    R_RELATIVE,
-    R_TIME,
-    R_ZONES,
-    S_ENERGY_END,
-    S_ENERGY_START,
-    S_GROUND_TIME,
-    S_HEAD_DEPTH,
-    S_HEAD_ZONE,
-    S_TIME,
-)
+from models.crash.record import Column, Frame, HeadContact, Summary
 from models.crash.scenario import Scenario
 from models.crash.surfaces import WORK_CHANNELS
 from models.criteria import (
@@ -100,7 +86,7 @@ class Signals:
 
     def __init__(self, raw: Raw) -> None:
         self._raw = raw
-        end = raw.record[-1, R_TIME]
+        end = raw.record[-1, Column.TIME]
         self.time: Array = np.arange(int(end * SAMPLING_RATE) + 1) / SAMPLING_RATE
         road = raw.primary_end
         split = self.time.size if math.isinf(road) else int(np.searchsorted(self.time, road))
@@ -115,7 +101,7 @@ class Signals:
     @functools.cached_property
     def _motion(self) -> Array:
         """Head acceleration, angular velocity and angular acceleration (n, 9) as recorded."""
-        return self.sampled(R_ACCELERATION, 9, self.head_time)
+        return self.sampled(Column.ACCELERATION, 9, self.head_time)
 
     @functools.cached_property
     def acceleration(self) -> Array:
@@ -157,16 +143,19 @@ def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
         return clip_level(time[car], signals.acceleration[car], mode=mode)
 
     def throw() -> float:
-        path = record[-1, R_CENTRE : R_CENTRE + 2] - record[0, R_CENTRE : R_CENTRE + 2]
+        path = (
+            record[-1, Column.CENTRE : Column.CENTRE + 2]
+            - record[0, Column.CENTRE : Column.CENTRE + 2]
+        )
         return float(np.hypot(*path))
 
     def ground_time() -> float:
         # A body may come to rest on its limbs, or on the car.
-        touched = landed and math.isfinite(raw.summary[S_GROUND_TIME])
-        return float(raw.summary[S_GROUND_TIME if touched else S_TIME])
+        touched = landed and math.isfinite(raw.summary[Summary.GROUND_TIME])
+        return float(raw.summary[Summary.GROUND_TIME if touched else Summary.TIME])
 
     def energy_residual() -> float:
-        gained = raw.summary[S_ENERGY_END] - raw.summary[S_ENERGY_START]
+        gained = raw.summary[Summary.ENERGY_AT_END] - raw.summary[Summary.ENERGY_AT_START]
         return float((gained - raw.work.sum()) / np.abs(raw.work).max())
 
     return {
@@ -180,11 +169,11 @@ def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
         "bric": lambda: brain_injury_criterion(signals.spin[car]),
         "throw_distance": throw,
         "launch_speed": lambda: float(
-            (np.diff(record[:, R_CENTRE]) / np.diff(record[:, R_TIME])).max()
+            (np.diff(record[:, Column.CENTRE]) / np.diff(record[:, Column.TIME])).max()
         ),
         "ground_hic15": lambda: ground_hic() if landed else 0.0,
         "ground_time": ground_time,
-        "crash_duration": lambda: float(raw.summary[S_TIME]),
+        "crash_duration": lambda: float(raw.summary[Summary.TIME]),
         "car_stopping_distance": lambda: stopping_distance(raw.scenario.car_motion),
         "energy_residual": energy_residual,
         **_head_contact(raw, signals),
@@ -194,35 +183,39 @@ def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
 def _head_contact(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
     """Return how the outputs of the head's contact with the car are had, NaN if there was none."""
     contact = raw.head_contact
-    zone = int(raw.summary[S_HEAD_ZONE])
-    if not math.isfinite(contact[0]) or zone < 0:
+    zone = int(raw.summary[Summary.HEAD_REGION])
+    if not math.isfinite(contact[HeadContact.TIME]) or zone < 0:
         return {"head_impact_time": lambda: math.nan}
+    velocity, normal, point = (
+        contact[first : first + 3]
+        for first in (HeadContact.VELOCITY, HeadContact.NORMAL, HeadContact.POINT)
+    )
     vehicle, laws = raw.scenario.vehicle, raw.scenario.ellipsoids
     law = int(laws.surface_law[HEAD, zone])
 
     @functools.cache
     def wad() -> float:
         dive = raw.chain.act("inputs", raw.values, raw.values)["dive_angle"]
-        surface = surface_point(raw.scenario.zones, zone, contact[[7, 9]])
+        surface = surface_point(raw.scenario.zones, zone, point[[0, 2]])
         return wrap_around_distance(vehicle.name, zone, static_point(vehicle, dive, surface))
 
     def mass() -> float:
         car = slice(0, signals.split)
-        force = signals.sampled(R_HEAD_CAR, 1)[car, 0]
+        force = signals.sampled(Column.HEAD_CAR_FORCE, 1)[car, 0]
         return effective_mass(signals.time[car], force, signals.acceleration[car])
 
     def intrusion() -> float:
-        depth = raw.summary[S_HEAD_DEPTH]
+        depth = raw.summary[Summary.HEAD_DEPTH]
         return float(interpolate_law(laws.laws, law, laws.counts[law], SURFACE, depth))
 
     return {
-        "head_impact_time": lambda: float(contact[0]),
-        "head_impact_speed": lambda: float(np.linalg.norm(contact[1:4])),
-        "head_impact_angle": lambda: impact_angle(contact[1:4], contact[4:7]),
+        "head_impact_time": lambda: float(contact[HeadContact.TIME]),
+        "head_impact_speed": lambda: float(np.linalg.norm(velocity)),
+        "head_impact_angle": lambda: impact_angle(velocity, normal),
         "effective_head_mass": mass,
         "wad": wad,
         "head_dent_distance": lambda: wad() - hood_edge_distance(vehicle.name),
-        "head_fender_distance": lambda: vehicle.hood_side - abs(float(contact[8])),
+        "head_fender_distance": lambda: vehicle.hood_side - abs(float(point[1])),
         "hood_intrusion": intrusion,
     }
 
@@ -249,34 +242,35 @@ def histories(
         "angular_acceleration": ("rad/s2", lambda: resultant(signals.spin_rate)),
         "velocity_relative_to_car": (
             "m/s",
-            lambda: resultant(signals.sampled(R_RELATIVE, 3, head)),
+            lambda: resultant(signals.sampled(Column.RELATIVE_VELOCITY, 3, head)),
         ),
         **{
-            f"velocity_relative_to_car_{axis}": ("m/s", column(R_RELATIVE + k, head))
+            f"velocity_relative_to_car_{axis}": ("m/s", column(Column.RELATIVE_VELOCITY + k, head))
             for k, axis in enumerate("xyz")
         },
-        "car_force": ("N", column(R_HEAD_CAR, head)),
+        "car_force": ("N", column(Column.HEAD_CAR_FORCE, head)),
     }
     contact_channels = {
-        zone.name: ("N", column(R_ZONES + j, signals.time)) for j, zone in enumerate(zones)
+        zone.name: ("N", column(Column.REGION_FORCE + j, signals.time))
+        for j, zone in enumerate(zones)
     }
     if not raw.rigid_road:
-        head_channels["road_force"] = ("N", column(R_HEAD_ROAD, head))
-        contact_channels["road"] = ("N", column(R_ZONES + len(zones), signals.time))
-    centre = {axis: ("m", column(R_CENTRE + k, signals.time)) for k, axis in enumerate("xyz")}
+        head_channels["road_force"] = ("N", column(Column.HEAD_ROAD_FORCE, head))
+        contact_channels["road"] = ("N", column(Column.REGION_FORCE + len(zones), signals.time))
+    centre = {axis: ("m", column(Column.CENTRE + k, signals.time)) for k, axis in enumerate("xyz")}
     found = chosen_histories(head, {"head": head_channels}, wanted) | chosen_histories(
         signals.time, {"contact_force": contact_channels, "centre_of_gravity": centre}, wanted
     )
     if wanted is None and raw.work.size:
         work = {name: (np.array([raw.work[k]]), "J") for k, name in enumerate(WORK_CHANNELS)}
-        found["work"] = history_of(np.array([raw.summary[S_TIME]]), work)
+        found["work"] = history_of(np.array([raw.summary[Summary.TIME]]), work)
     return found
 
 
 def scene(raw: Raw) -> Scene:
     """Return the poses of the segments and the car's outlines."""
     frames, n = raw.frames, len(SEGMENTS)
-    pose = frames[:, 4:].reshape(-1, n, 7)
+    pose = frames[:, Frame.POSES :].reshape(-1, n, 7)
     zones = raw.scenario.zones
     outline = []
     for j in range(zones.radius.size):
@@ -298,12 +292,12 @@ def scene(raw: Raw) -> Scene:
         axis=1,
     )
     return Scene(
-        time=frames[:, 0].copy(),
+        time=frames[:, Frame.TIME].copy(),
         names=SEGMENTS,
         semi_axes=np.sqrt(raw.scenario.ellipsoids.square),
         centre=pose[:, :, :3].copy(),
         orientation=pose[:, :, 3:].copy(),
-        car=frames[:, 1:4].copy(),
+        car=frames[:, Frame.CAR : Frame.POSES].copy(),
         outline=outline,
         plan=plan,
     )

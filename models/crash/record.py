@@ -1,7 +1,6 @@
-"""What a crash model writes down while it steps, and when a body counts as at rest."""
+"""What a crash model writes down while it steps, by name, and when a body counts as at rest."""
 
-REST, REST_ON_CAR, TIME_LIMIT, STEP_LIMIT, NOT_FINITE = range(5)
-END_REASONS = ("rest_on_road", "rest_on_car", "time_limit", "step_limit", "not_finite")
+from enum import IntEnum
 
 REST_SPEED = 0.05
 """Speed (m/s) of the centre of gravity below which the body counts as at rest (assumed; at 0.6 g
@@ -11,29 +10,95 @@ REST_SPREAD = 0.3
 REST_TIME = 0.03
 """Time (s) for which both must hold (assumed)."""
 
-# Columns of the record.
-R_TIME = 0
-R_ACCELERATION = 1  # 3: head, specific force, world, m/s2
-R_SPIN = 4  # 3: head angular velocity, own axes, rad/s
-R_SPIN_RATE = 7  # 3: head angular acceleration, own axes, rad/s2
-R_RELATIVE = 10  # 3: head velocity relative to the car front, car axes, m/s
-R_HEAD_CAR = 13  # head contact force with the car, N
-R_HEAD_ROAD = 14
-R_CENTRE = 15  # 3: centre of gravity, m
-R_ZONES = 18  # z + 1: normal force by zone, last the road, N
 
-# Entries of the summary.
-(
-    S_REASON,
-    S_TIME,
-    S_STEPS,
-    S_RECORDS,
-    S_FRAMES,
-    S_GROUND_TIME,
-    S_ENERGY_START,
-    S_ENERGY_END,
-    S_HEAD_ZONE,
-    S_HEAD_DEPTH,
-    S_CENTRE_SPEED,
-) = range(11)
-SUMMARY = 11
+class EndReason(IntEnum):
+    """Why a run ended."""
+
+    REST_ON_ROAD = 0
+    REST_ON_CAR = 1
+    TIME_LIMIT = 2
+    STEP_LIMIT = 3
+    NOT_FINITE = 4
+
+
+END_REASONS = tuple(reason.name.lower() for reason in EndReason)
+GOES_ON = -1
+"""In place of a reason: the run has not ended."""
+
+
+class Column(IntEnum):
+    """First columns of a row of the record; the number of columns in brackets."""
+
+    TIME = 0
+    """(1) s."""
+    ACCELERATION = 1
+    """(3) of the head, specific force, world axes, m/s2."""
+    SPIN = 4
+    """(3) head angular velocity, own axes, rad/s."""
+    SPIN_RATE = 7
+    """(3) head angular acceleration, own axes, rad/s2."""
+    RELATIVE_VELOCITY = 10
+    """(3) of the head against the car, car axes, m/s."""
+    HEAD_CAR_FORCE = 13
+    """(1) of the car on the head, N."""
+    HEAD_ROAD_FORCE = 14
+    """(1) of the road on the head, N."""
+    CENTRE = 15
+    """(3) centre of gravity, m."""
+    REGION_FORCE = 18
+    """(regions + 1) normal force by region of the car's front, last the road, N."""
+
+
+class Summary(IntEnum):
+    """Entries of the summary of a run."""
+
+    END_REASON = 0
+    TIME = 1
+    STEPS = 2
+    RECORDS = 3
+    FRAMES = 4
+    GROUND_TIME = 5
+    ENERGY_AT_START = 6
+    ENERGY_AT_END = 7
+    HEAD_REGION = 8
+    HEAD_DEPTH = 9
+    CENTRE_SPEED = 10
+
+
+class HeadContact(IntEnum):
+    """First entries of the head's contact with the car, all in the car's frame."""
+
+    TIME = 0
+    """(1) s of first contact, NaN without any."""
+    VELOCITY = 1
+    """(3) m/s, against the car, at the first blow."""
+    NORMAL = 4
+    """(3) at first contact."""
+    POINT = 7
+    """(3) m, deepest point at the deepest contact."""
+
+
+class Frame(IntEnum):
+    """First columns of a frame."""
+
+    TIME = 0
+    CAR = 1
+    """(3) x, y, yaw of the car's frame, m and rad."""
+    POSES = 4
+    """(7 n) centre (m) and quaternion of each ellipsoid."""
+
+
+class Blow(IntEnum):
+    """Entries of the head's last blow on an arm."""
+
+    START = 0
+    VELOCITY = 1
+    """(3) m/s, against the car, at its start."""
+    LAST = 4
+    PEAK = 5
+
+
+HEAD_CONTACT_ENTRIES = HeadContact.POINT + 3
+"""Entries of a head contact."""
+BLOW_ENTRIES = Blow.PEAK + 1
+"""Entries of a blow."""

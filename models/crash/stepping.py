@@ -3,6 +3,7 @@
 import math
 
 from models.compilation import inlined_kernel
+from models.crash.front import is_across, is_near, patch_count
 
 HEAD_NEAR = 0.03
 """Distance (m) from a car zone within which a closing head is stepped finely (assumed)."""
@@ -15,7 +16,7 @@ HEAD_FORCE = 300.0
 
 
 @inlined_kernel
-def head_meets_car(head, ellipsoids, zones, car, motion, contacts):
+def head_meets_car(head, ellipsoids, front, car, motion, contacts):
     """Return whether the head is loaded by the car, or near and closing on it."""
     reach = ellipsoids.reach[head]
     cosine, sine = math.cos(car[2]), math.sin(car[2])
@@ -26,15 +27,10 @@ def head_meets_car(head, ellipsoids, zones, car, motion, contacts):
     uy = motion.velocity[head, 1] - car[4] - car[5] * wx
     # Closing on the car: downwards onto hood or windscreen, or rearwards into its front.
     closing = -motion.velocity[head, 2] > HEAD_FALL or cosine * ux + sine * uy < -HEAD_SPEED
-    for j in range(zones.radius.shape[0]):
+    for j in range(patch_count(front)):
         if contacts.segment_force[head, j] > HEAD_FORCE:
             return True
-        if closing and (
-            x < zones.box[j, 1] + reach + HEAD_NEAR
-            and x > zones.box[j, 0] - reach - HEAD_NEAR
-            and z < zones.box[j, 3] + reach + HEAD_NEAR
-            and z > zones.box[j, 2] - reach - HEAD_NEAR
-            and y < zones.half_width[j] + reach + HEAD_NEAR
-        ):
+        margin = reach + HEAD_NEAR
+        if closing and is_near(front, j, margin, x, z) and is_across(front, j, margin, y):
             return True
     return False

@@ -7,15 +7,13 @@ import numpy as np
 from models import data
 from models.crash import outcome
 from models.crash.model import FRAME_INTERVAL, TIME_LIMIT, CrashModel
-from models.crash.record import S_FRAMES, S_GROUND_TIME, S_RECORDS, SUMMARY
-from models.crash.surfaces import CHANNELS, empty_contacts
+from models.crash.record import Summary
 from models.declaration import read_inputs, read_outputs
 from models.effects.registry import effects_of
 from models.multibody.setup import Crash, build_crash
-from models.multibody.simulation import Settings, empty_scratch, simulate
+from models.multibody.simulation import CoreModel, Settings, empty_data, simulate
 from models.multibody.stability import STABLE, joint_rate, stable_ticks, surface_mobility
-from models.multibody.tree import empty_loads
-from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
+from models.pedestrian.anthropometry import HEAD, TRUNK
 
 COARSE, SLIDE, FLIGHT = 3, 6, 6
 """Ticks a step in quiet contact with the car, on the road alone, and in free flight."""
@@ -46,7 +44,6 @@ class MultibodyModel(CrashModel):
         ----------
         crash : as ``build_crash`` gives it. values : of all inputs, from which it was built.
         """
-        n, zones = len(SEGMENTS), len(self.vehicle.zones)
         scenario = crash.scenario
         rate = joint_rate(crash.tree, scenario.joints, crash.motion)
         # A light body with stiff joints takes a finer step than asked for.
@@ -66,21 +63,22 @@ class MultibodyModel(CrashModel):
             trunk=max(TRUNK),
             mobility=surface_mobility(crash.tree, scenario.body.semi_axes),
         )
-        work, head_contact, summary = np.zeros(CHANNELS), np.full(10, np.nan), np.zeros(SUMMARY)
-        simulate(
+        model = CoreModel(
             crash.tree, scenario.joints, scenario.ellipsoids, scenario.zones, scenario.road,
             scenario.car_motion, settings,
-            crash.motion, empty_loads(n), empty_contacts(n, zones, len(scenario.ellipsoids.pairs)),
-            empty_scratch(n), work, record, self._frames, head_contact, summary,
         )  # fmt: skip
+        pairs = len(scenario.ellipsoids.pairs)
+        data = empty_data(crash.motion, len(self.vehicle.zones), pairs, record, self._frames)
+        simulate(model, data)
+        summary = data.summary
         return outcome.Raw(
             scenario=scenario,
             chain=self._chain,
             values=values,
-            record=record[: int(summary[S_RECORDS])],
-            frames=self._frames[: int(summary[S_FRAMES])],
-            work=work,
-            head_contact=head_contact,
+            record=record[: int(summary[Summary.RECORDS])],
+            frames=self._frames[: int(summary[Summary.FRAMES])],
+            work=data.work,
+            head_contact=data.head_contact,
             summary=summary,
-            primary_end=float(summary[S_GROUND_TIME]),
+            primary_end=float(summary[Summary.GROUND_TIME]),
         )

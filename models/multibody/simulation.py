@@ -7,57 +7,45 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.compilation import inlined_kernel, kernel
+from models.contact.road import Road
 from models.crash.body_contact import apply_road_contacts, apply_self_contacts
 from models.crash.car_contact import apply_car_contacts
+from models.crash.ellipsoids import Ellipsoids
 from models.crash.record import (
-    NOT_FINITE,
-    REST,
-    REST_ON_CAR,
-    REST_SPEED,
-    REST_SPREAD,
-    REST_TIME,
-    S_CENTRE_SPEED,
-    S_ENERGY_END,
-    S_ENERGY_START,
-    S_FRAMES,
-    S_GROUND_TIME,
-    S_HEAD_ZONE,
-    S_REASON,
-    S_RECORDS,
-    S_STEPS,
-    S_TIME,
-    STEP_LIMIT,
-    TIME_LIMIT,
+    BLOW_ENTRIES,
+    GOES_ON,
+    HEAD_CONTACT_ENTRIES,
+    Blow,
+    Column,
+    EndReason,
+    Summary,
+)
+from models.crash.recorder import (
+    limit_reason,
+    note_blow,
+    note_head,
+    rest_reason,
+    speeds_of,
+    time_at_rest,
+    write_centre,
+    write_contact_forces,
+    write_end,
+    write_frame,
 )
 from models.crash.stepping import HEAD_FALL, HEAD_FORCE, head_meets_car
-from models.crash.surfaces import CHANNELS, update_surfaces
+from models.crash.surfaces import CHANNELS, Contacts, empty_contacts, update_surfaces
 from models.multibody.bushings import apply_bushings
 from models.multibody.integration import Memory, correct, empty_memory, predict
 from models.multibody.joints import apply_joint_torques
-from models.multibody.kinematics import update_kinematics
-from models.multibody.recording import B_LAST, BLOW, note_blow, note_head, write_frame, write_record
+from models.multibody.kinematics import centre_acceleration, update_kinematics
 from models.multibody.stability import ticks_in_contact
 from models.multibody.sweeps import solve_accelerations
-from models.vehicle.motion import car_state
+from models.multibody.tree import Loads, Motion, Tree, empty_loads
+from models.pedestrian.joints import Joints
+from models.vehicle.motion import CarMotion, car_state
+from models.vehicle.zones import Zones
 
 Array = NDArray[np.float64]
-
-
-class Scratch(NamedTuple):
-    """Workspace of the step loop."""
-
-    car: Array
-    power: Array
-    old_power: Array
-    memory: Memory
-    blow: Array
-
-
-def empty_scratch(n: int) -> Scratch:
-    """Return the workspace for ``n`` segments."""
-    return Scratch(
-        np.zeros(6), np.zeros(CHANNELS), np.zeros(CHANNELS), empty_memory(n), np.zeros(BLOW)
-    )
 
 
 class Settings(NamedTuple):
@@ -85,8 +73,88 @@ class Settings(NamedTuple):
     mobility: Array
 
 
+class CoreModel(NamedTuple):
+    """What does not change in a run.
+
+    Attributes
+    ----------
+    tree, joints, ellipsoids : of the body.
+    front : geometry of the car's front, one of the types of ``models.crash.front``.
+    road, car_motion : of the surroundings.
+    settings : of the step loop.
+    """
+
+    tree: Tree
+    joints: Joints
+    ellipsoids: Ellipsoids
+    front: Zones
+    road: Road
+    car_motion: CarMotion
+    settings: Settings
+
+
+class CoreData(NamedTuple):
+    """State, loads, workspace and what is written down; all of it changes in a run.
+
+    Attributes
+    ----------
+    motion, loads, contacts : of the body.
+    car : (6,) place, yaw and their rates; see ``models.vehicle.motion``.
+    power, old_power : (channels,) W on the body by channel, at both ends of a step.
+    memory : of the integrator. blow : the head's last one; see ``models.crash.record``.
+    work : (channels,) J on the body.
+    record : (rows, columns). frames : (rows, 4 + 7 n). head_contact, summary : entries.
+    """
+
+    motion: Motion
+    loads: Loads
+    contacts: Contacts
+    car: Array
+    power: Array
+    old_power: Array
+    memory: Memory
+    blow: Array
+    work: Array
+    record: Array
+    frames: Array
+    head_contact: Array
+    summary: Array
+
+
+def empty_data(motion: Motion, patches: int, pairs: int, record: Array, frames: Array) -> CoreData:
+    """Return the data of a run that begins from a motion.
+
+    Parameters
+    ----------
+    motion : Motion
+        Changed in place.
+    patches : int
+        Of the car's front.
+    pairs : int
+        Of segments that can touch each other.
+    record, frames : arrays
+        To be filled.
+    """
+    n = motion.orientation.shape[0]
+    return CoreData(
+        motion=motion,
+        loads=empty_loads(n),
+        contacts=empty_contacts(n, patches, pairs),
+        car=np.zeros(6),
+        power=np.zeros(CHANNELS),
+        old_power=np.zeros(CHANNELS),
+        memory=empty_memory(n),
+        blow=np.zeros(BLOW_ENTRIES),
+        work=np.zeros(CHANNELS),
+        record=record,
+        frames=frames,
+        head_contact=np.full(HEAD_CONTACT_ENTRIES, np.nan),
+        summary=np.zeros(len(Summary)),
+    )
+
+
 @inlined_kernel
-def total_energy(tree, motion, road_surface):
+def total_energy(tree, motion, road):
     """Return kinetic plus gravitational energy (J) of the tree."""
     energy = 0.0
     for i in range(tree.mass.shape[0]):
@@ -99,44 +167,63 @@ def total_energy(tree, motion, road_surface):
                 + motion.rotation[i, 2, k] * motion.angular_velocity[i, 2]
             )
             energy += 0.5 * m * v * v + 0.5 * tree.inertia[i, k] * w * w
-        energy += m * road_surface.weight * motion.centre[i, 2]
-        energy -= m * road_surface.pull * motion.centre[i, 0]
+        energy += m * road.weight * motion.centre[i, 2]
+        energy -= m * road.pull * motion.centre[i, 0]
     return energy
 
 
 @inlined_kernel
-def evaluate(tree, joints, ellipsoids, zones, road_surface, car, motion, loads, contacts, power):
-    """Fill loads and accelerations for the present state; write the powers (W) of all channels."""
+def evaluate(model, data):
+    """Fill loads and accelerations for the present state, and the powers (W) of all channels."""
+    tree, motion, loads, contacts = model.tree, data.motion, data.loads, data.contacts
+    power, road = data.power, model.road
     for k in range(CHANNELS):
         power[k] = 0.0
     for j in range(contacts.zone_force.shape[0]):
         contacts.zone_force[j] = 0.0
     update_kinematics(tree, motion)
     for i in range(tree.mass.shape[0]):
-        loads.force[i, 0] = tree.mass[i] * road_surface.pull
+        loads.force[i, 0] = tree.mass[i] * road.pull
         loads.force[i, 1] = 0.0
-        loads.force[i, 2] = -tree.mass[i] * road_surface.weight
+        loads.force[i, 2] = -tree.mass[i] * road.weight
         loads.torque[i, 0] = 0.0
         loads.torque[i, 1] = 0.0
         loads.torque[i, 2] = 0.0
-    update_surfaces(ellipsoids, motion, contacts)
-    apply_joint_torques(tree, joints, motion, loads, power)
-    apply_bushings(tree, joints, motion, loads, power)
-    apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, tree, power)
-    apply_road_contacts(zones, ellipsoids, road_surface, motion, loads, contacts, tree, power)
-    apply_self_contacts(ellipsoids, motion, loads, contacts, tree, power)
+    update_surfaces(model.ellipsoids, motion, contacts)
+    apply_joint_torques(tree, model.joints, motion, loads, power)
+    apply_bushings(tree, model.joints, motion, loads, power)
+    apply_car_contacts(
+        model.front, model.ellipsoids, data.car, motion, loads, contacts, tree, power
+    )
+    apply_road_contacts(model.ellipsoids, road, motion, loads, contacts, tree, power)
+    apply_self_contacts(model.ellipsoids, motion, loads, contacts, tree, power)
     solve_accelerations(tree, motion, loads)
 
 
 @inlined_kernel
-def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts):
+def step(model, data, time, length):
+    """Advance the state by a step of ``length`` (s) that ends at ``time`` (s)."""
+    for k in range(CHANNELS):
+        data.old_power[k] = data.power[k]
+    predict(model.tree, data.motion, data.loads, data.memory, length)
+    car_state(model.car_motion, time, data.car)
+    evaluate(model, data)
+    correct(model.tree, data.motion, data.loads, data.memory, length)
+    for k in range(CHANNELS):
+        data.work[k] += 0.5 * length * (data.old_power[k] + data.power[k])
+
+
+@inlined_kernel
+def _ticks_of_next_step(model, data):
     """Return how many ticks the next step may take.
 
     One while the head is fast near the car or meets the road; the settings say how many in free
     flight and otherwise.
     """
+    settings, ellipsoids = model.settings, model.ellipsoids
+    motion, contacts = data.motion, data.contacts
     head = settings.head
-    if head_meets_car(head, ellipsoids, zones, car, motion, contacts):
+    if head_meets_car(head, ellipsoids, model.front, data.car, motion, contacts):
         return 1
     fall = -motion.velocity[head, 2]
     road = contacts.zone_force.shape[0] - 1
@@ -159,107 +246,85 @@ def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts):
 
 
 @inlined_kernel
-def _speeds(tree, motion):
-    """Return the speed of the centre of gravity and the root mean square segment speed."""
-    total, square = 0.0, 0.0
-    px, py, pz = 0.0, 0.0, 0.0
-    for i in range(tree.mass.shape[0]):
-        m = tree.mass[i]
-        vx, vy, vz = motion.velocity[i, 0], motion.velocity[i, 1], motion.velocity[i, 2]
-        total += m
-        px += m * vx
-        py += m * vy
-        pz += m * vz
-        square += m * (vx * vx + vy * vy + vz * vz)
-    return math.sqrt(px * px + py * py + pz * pz) / total, math.sqrt(square / total)
+def _write_record(row, time, model, data):
+    """Write a row of the record."""
+    motion, loads, record, road = data.motion, data.loads, data.record, model.road
+    head = model.settings.head
+    ax, ay, az = centre_acceleration(motion, loads, head)
+    record[row, Column.ACCELERATION] = ax - road.pull
+    record[row, Column.ACCELERATION + 1] = ay
+    record[row, Column.ACCELERATION + 2] = az + road.weight
+    for k in range(3):
+        w, q = 0.0, 0.0
+        for j in range(3):
+            w += motion.rotation[head, j, k] * motion.angular_velocity[head, j]
+            q += motion.rotation[head, j, k] * loads.angular_acceleration[head, j]
+        record[row, Column.SPIN + k] = w
+        record[row, Column.SPIN_RATE + k] = q
+    write_contact_forces(row, time, head, motion, data.contacts, data.car, record)
+    write_centre(row, model.tree.mass, motion, record)
+
+
+@inlined_kernel
+def _note_landing(time, settings, contacts, summary):
+    """Note when trunk or head first meet the road."""
+    road = contacts.zone_force.shape[0] - 1
+    if summary[Summary.GROUND_TIME] == math.inf:
+        for i in range(settings.trunk + 1):
+            if contacts.segment_force[i, road] > 0.0:
+                summary[Summary.GROUND_TIME] = time
+        if contacts.segment_force[settings.head, road] > 0.0:
+            summary[Summary.GROUND_TIME] = time
 
 
 @kernel
-def simulate(
-    tree, joints, ellipsoids, zones, road_surface, car_motion, settings,
-    motion, loads, contacts, scratch, work, record, frames, head_contact, summary,
-):  # fmt: skip
+def simulate(model, data):
     """Run from the present state to rest.
 
     Parameters
     ----------
-    tree, joints, ellipsoids, zones, road_surface, car_motion, settings
-        Constant data.
-    motion, loads, contacts, scratch
-        State and workspace, changed in place.
-    work : (CHANNELS,) J, filled: work on the body by channel.
-    record : (rows, 18 + z + 1), frames : (rows, 4 + 7 n), filled.
-    head_contact : (10,) NaN, filled at the head's first contact with the car: time, velocity
-        relative to the car at its first blow (3), normal (3); at its deepest: contact point (3),
-        all in the car's frame.
-    summary : (SUMMARY,), filled.
+    model : CoreModel
+    data : CoreData
+        Changed in place; record, frames, work, head contact and summary are filled.
     """
-    car, power, old_power = scratch.car, scratch.power, scratch.old_power
-    memory = scratch.memory
-    head = settings.head
-    road = zones.radius.shape[0]
-    time = 0.0
-    car_state(car_motion, time, car)
-    evaluate(tree, joints, ellipsoids, zones, road_surface, car, motion, loads, contacts, power)
-    summary[S_ENERGY_START] = total_energy(tree, motion, road_surface)
-    summary[S_GROUND_TIME] = math.inf
-    summary[S_HEAD_ZONE] = -1.0
+    settings, tree, motion, contacts = model.settings, model.tree, data.motion, data.contacts
+    summary, head = data.summary, settings.head
+    time, quiet = 0.0, 0.0
+    car_state(model.car_motion, time, data.car)
+    evaluate(model, data)
+    summary[Summary.ENERGY_AT_START] = total_energy(tree, motion, model.road)
+    summary[Summary.GROUND_TIME] = math.inf
+    summary[Summary.HEAD_REGION] = -1.0
+    data.blow[Blow.LAST] = -math.inf
     rows, shots, steps, ticks = 0, 0, 0, 0
-    scratch.blow[B_LAST] = -math.inf
-    quiet = 0.0
-    reason = TIME_LIMIT
     while True:
-        if rows < record.shape[0]:
-            write_record(rows, time, head, tree, road_surface, motion, loads, contacts, car, record)
+        if rows < data.record.shape[0]:
+            _write_record(rows, time, model, data)
             rows += 1
-        if ticks >= shots * settings.frame_every and shots < frames.shape[0]:
-            write_frame(shots, time, motion, contacts, car, frames)
+        if ticks >= shots * settings.frame_every and shots < data.frames.shape[0]:
+            write_frame(shots, time, motion.orientation, contacts, data.car, data.frames)
             shots += 1
-        if time >= settings.time_limit:
+        reason = limit_reason(time, steps, settings)
+        if reason != GOES_ON:
             break
-        if steps >= settings.step_limit:
-            reason = STEP_LIMIT
-            break
-        for k in range(CHANNELS):
-            old_power[k] = power[k]
-        jump = _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts)
-        h = jump * settings.tick
-        predict(tree, motion, loads, memory, h)
+        jump = _ticks_of_next_step(model, data)
+        length = jump * settings.tick
         steps += 1
         ticks += jump
         time = ticks * settings.tick
-        car_state(car_motion, time, car)
-        evaluate(tree, joints, ellipsoids, zones, road_surface, car, motion, loads, contacts, power)
-        correct(tree, motion, loads, memory, h)
-        for k in range(CHANNELS):
-            work[k] += 0.5 * h * (old_power[k] + power[k])
-        note_blow(time, head, ellipsoids, motion, contacts, car, scratch.blow)
-        note_head(time, head, motion, contacts, car, scratch.blow, head_contact, summary)
-        # First landing of trunk or head.
-        if summary[S_GROUND_TIME] == math.inf:
-            for i in range(settings.trunk + 1):
-                if contacts.segment_force[i, road] > 0.0:
-                    summary[S_GROUND_TIME] = time
-            if contacts.segment_force[head, road] > 0.0:
-                summary[S_GROUND_TIME] = time
-        speed, spread = _speeds(tree, motion)
+        step(model, data, time, length)
+        note_blow(time, head, model.ellipsoids, motion, contacts, data.car, data.blow)
+        note_head(time, head, motion, contacts, data.car, data.blow, data.head_contact, summary)
+        _note_landing(time, settings, contacts, summary)
+        speed, spread = speeds_of(tree.mass, motion)
         if not math.isfinite(spread):
-            reason = NOT_FINITE
+            reason = EndReason.NOT_FINITE.value
             break
-        quiet = quiet + h if speed < REST_SPEED and spread < REST_SPREAD else 0.0
-        if quiet >= REST_TIME:
-            reason = REST
+        quiet = time_at_rest(speed, spread, length, quiet)
+        reason = rest_reason(quiet, contacts)
+        if reason != GOES_ON:
             break
     update_kinematics(tree, motion)
-    speed, spread = _speeds(tree, motion)
-    if reason == REST:
-        for j in range(road):
-            if contacts.zone_force[j] > 0.0:
-                reason = REST_ON_CAR
-    summary[S_REASON] = float(reason)
-    summary[S_TIME] = time
-    summary[S_STEPS] = float(steps)
-    summary[S_RECORDS] = float(rows)
-    summary[S_FRAMES] = float(shots)
-    summary[S_ENERGY_END] = total_energy(tree, motion, road_surface)
-    summary[S_CENTRE_SPEED] = speed
+    speed, _ = speeds_of(tree.mass, motion)
+    write_end(reason, time, steps, rows, shots, speed, summary)
+    summary[Summary.ENERGY_AT_END] = total_energy(tree, motion, model.road)

@@ -8,16 +8,17 @@ from models import data
 from models.crash import outcome
 from models.crash.first_contact import first_contact_shift, widen_gaps
 from models.crash.model import FRAME_INTERVAL, TIME_LIMIT, CrashModel
-from models.crash.record import S_FRAMES, S_GROUND_TIME, S_HEAD_ZONE, S_RECORDS, SUMMARY
+from models.crash.record import BLOW_ENTRIES, HEAD_CONTACT_ENTRIES, Summary
 from models.crash.scenario import build_scenario
 from models.crash.surfaces import CHANNELS, Contacts, empty_contacts
 from models.declaration import read_inputs, read_outputs
 from models.effects.registry import effects_of
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
+from models.planar import stepping
 from models.planar.body import PlanarBody, hold_in_plane, surfaces_in_plane
 from models.planar.chipmunk import EACH_BODY, STEP_SPACE
 from models.planar.joints import joints_in_plane
-from models.planar.recording import M_ROAD_TIME, MEMORY
+from models.planar.recording import Memory
 from models.planar.space import STATE, PlanarSpace
 from models.planar.stepping import (
     PlanarMotion,
@@ -72,26 +73,31 @@ class PlanarModel(CrashModel):
             step_limit=self._record.shape[0] - 1, frame_every=round(FRAME_INTERVAL / self.tick),
             head=HEAD, trunk=max(TRUNK),
         )  # fmt: skip
-        head_contact, summary = np.full(10, np.nan), np.zeros(SUMMARY)
-        memory = np.zeros(MEMORY)
-        memory[M_ROAD_TIME] = np.inf
-        summary[S_GROUND_TIME], summary[S_HEAD_ZONE] = np.inf, -1.0
-        simulate(
-            STEP_SPACE, EACH_BODY, space.link, body, joints, ellipsoids, scenario.zones,
-            scenario.road, car_motion, settings, space.state, space.given, motion, empty_loads(n),
-            contacts, np.zeros(6), np.zeros(CHANNELS), memory,
-            self._record, self._frames, head_contact, summary,
+        model = stepping.PlanarModel(
+            space.link, body, joints, ellipsoids, scenario.zones, scenario.road, car_motion,
+            settings,
         )  # fmt: skip
+        data = stepping.PlanarData(
+            state=space.state, given=space.given, motion=motion, loads=empty_loads(n),
+            contacts=contacts, orientation=np.zeros((n, 4)), car=np.zeros(6),
+            power=np.zeros(CHANNELS), memory=np.zeros(len(Memory)),
+            blow=np.full(BLOW_ENTRIES, -np.inf), record=self._record, frames=self._frames,
+            head_contact=np.full(HEAD_CONTACT_ENTRIES, np.nan), summary=np.zeros(len(Summary)),
+        )  # fmt: skip
+        data.memory[Memory.ROAD_TIME] = np.inf
+        summary = data.summary
+        summary[Summary.GROUND_TIME], summary[Summary.HEAD_REGION] = np.inf, -1.0
+        simulate(STEP_SPACE, EACH_BODY, model, data)
         return outcome.Raw(
             scenario=replace(scenario, car_motion=car_motion, ellipsoids=ellipsoids),
             chain=self._chain,
             values=values,
-            record=self._record[: int(summary[S_RECORDS])],
-            frames=self._frames[: int(summary[S_FRAMES])],
+            record=self._record[: int(summary[Summary.RECORDS])],
+            frames=self._frames[: int(summary[Summary.FRAMES])],
             work=np.empty(0),
-            head_contact=head_contact,
+            head_contact=data.head_contact,
             summary=summary,
-            primary_end=float(memory[M_ROAD_TIME]),
+            primary_end=float(data.memory[Memory.ROAD_TIME]),
             rigid_road=True,
         )
 

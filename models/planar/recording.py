@@ -1,94 +1,67 @@
-"""What a planar run writes down between steps: record, frames, head contact, landing."""
+"""What a planar run writes down beside what all crash models do: accelerations, poses, landing."""
 
 import math
+from enum import IntEnum
 
 from models.compilation import inlined_kernel
-from models.crash.car_contact import car_force_of
-from models.crash.record import (
-    R_ACCELERATION,
-    R_CENTRE,
-    R_HEAD_CAR,
-    R_HEAD_ROAD,
-    R_RELATIVE,
-    R_SPIN,
-    R_SPIN_RATE,
-    R_TIME,
-    R_ZONES,
-    S_GROUND_TIME,
-    S_HEAD_DEPTH,
-    S_HEAD_ZONE,
-)
-from models.planar.space import ANGLE, SPEED_X, SPEED_Z, SPIN, X, Z
+from models.crash.record import Column, Frame, HeadContact, Summary
+from models.crash.recorder import write_centre, write_contact_forces, write_frame
+from models.planar.space import ANGLE, SPEED_X, SPEED_Z, SPIN
 
 TOUCH = 0.005
 """m above the road at which a segment counts as landed: the road's slop and the polygon's error."""
 
-# Entries of the memory from step to step.
-(
-    M_TICKS,
-    M_STEPS,
-    M_ROWS,
-    M_SHOTS,
-    M_QUIET,
-    M_LENGTH,
-    M_TOUCHED,
-    M_SPEED_X,
-    M_SPEED_Z,
-    M_SPIN,
-    M_AIRBORNE,
-    M_ROAD_TIME,
-) = range(12)
-MEMORY = 12
+
+class Memory(IntEnum):
+    """Entries of the memory from step to step."""
+
+    TICKS = 0
+    STEPS = 1
+    ROWS = 2
+    SHOTS = 3
+    QUIET = 4
+    LENGTH = 5
+    SPEED_X = 6
+    SPEED_Z = 7
+    SPIN = 8
+    AIRBORNE = 9
+    ROAD_TIME = 10
 
 
 @inlined_kernel
-def write_record(row, time, body, road, settings, state, contacts, car, memory, record):
+def write_row(row, time, model, data):
     """Write a row, and into the one before the head's acceleration since then."""
-    head = settings.head
-    zones = contacts.zone_force.shape[0] - 1
+    body, road, head = model.body, model.road, model.settings.head
+    state, memory, record = data.state, data.memory, data.record
     if row > 0:
-        length = memory[M_LENGTH]
-        spin_rate = (state[head, SPIN] - memory[M_SPIN]) / length
-        ax = (state[head, SPEED_X] - memory[M_SPEED_X]) / length
-        az = (state[head, SPEED_Z] - memory[M_SPEED_Z]) / length
-        record[row - 1, R_ACCELERATION] = ax - road.pull
-        record[row - 1, R_ACCELERATION + 2] = az + road.weight
+        length = memory[Memory.LENGTH]
+        spin_rate = (state[head, SPIN] - memory[Memory.SPIN]) / length
+        ax = (state[head, SPEED_X] - memory[Memory.SPEED_X]) / length
+        az = (state[head, SPEED_Z] - memory[Memory.SPEED_Z]) / length
+        record[row - 1, Column.ACCELERATION] = ax - road.pull
+        record[row - 1, Column.ACCELERATION + 2] = az + road.weight
         for k in range(3):
-            record[row - 1, R_SPIN_RATE + k] = -spin_rate * body.normal[head, k]
+            record[row - 1, Column.SPIN_RATE + k] = -spin_rate * body.normal[head, k]
             # The last row has no step after it.
-            record[row, R_SPIN_RATE + k] = record[row - 1, R_SPIN_RATE + k]
-            record[row, R_ACCELERATION + k] = record[row - 1, R_ACCELERATION + k]
-    record[row, R_TIME] = time
+            record[row, Column.SPIN_RATE + k] = record[row - 1, Column.SPIN_RATE + k]
+            record[row, Column.ACCELERATION + k] = record[row - 1, Column.ACCELERATION + k]
     for k in range(3):
-        record[row, R_SPIN + k] = -state[head, SPIN] * body.normal[head, k]
-    record[row, R_RELATIVE] = state[head, SPEED_X] - car[3]
-    record[row, R_RELATIVE + 2] = state[head, SPEED_Z]
-    for j in range(zones):
-        record[row, R_ZONES + j] = contacts.zone_force[j]
-    record[row, R_HEAD_CAR] = car_force_of(contacts, head)
+        record[row, Column.SPIN + k] = -state[head, SPIN] * body.normal[head, k]
+    write_contact_forces(row, time, head, data.motion, data.contacts, data.car, record)
     # Pymunk's impulses on the road are no forces.
-    record[row, R_HEAD_ROAD] = math.nan
-    record[row, R_ZONES + zones] = math.nan
-    total, x, z = 0.0, 0.0, 0.0
-    for i in range(body.mass.shape[0]):
-        total += body.mass[i]
-        x += body.mass[i] * state[i, X]
-        z += body.mass[i] * state[i, Z]
-    record[row, R_CENTRE] = x / total
-    record[row, R_CENTRE + 2] = z / total
+    record[row, Column.HEAD_ROAD_FORCE] = math.nan
+    record[row, Column.REGION_FORCE + data.contacts.zone_force.shape[0] - 1] = math.nan
+    write_centre(row, body.mass, data.motion, record)
 
 
 @inlined_kernel
-def write_frame(row, time, body, state, contacts, car, frames):
-    """Write the poses of all segments as places and quaternions."""
-    frames[row, 0] = time
-    frames[row, 1], frames[row, 2], frames[row, 3] = car[0], car[1], car[2]
+def write_poses(row, time, body, state, orientation, contacts, car, frames):
+    """Write the poses of all segments: their place across the plane, the start's quaternion turned.
+
+    ``orientation`` (n, 4) is filled.
+    """
     for i in range(body.mass.shape[0]):
-        first = 4 + 7 * i
-        frames[row, first] = contacts.centre[i, 0]
-        frames[row, first + 1] = body.side[i]
-        frames[row, first + 2] = contacts.centre[i, 2]
-        # The start's quaternion, turned about -y.
+        # About -y.
         c, s = math.cos(0.5 * state[i, ANGLE]), -math.sin(0.5 * state[i, ANGLE])
         w, x, y, z = (
             body.orientation[i, 0],
@@ -96,34 +69,13 @@ def write_frame(row, time, body, state, contacts, car, frames):
             body.orientation[i, 2],
             body.orientation[i, 3],
         )
-        frames[row, first + 3] = c * w - s * y
-        frames[row, first + 4] = c * x + s * z
-        frames[row, first + 5] = c * y + s * w
-        frames[row, first + 6] = c * z - s * x
-
-
-@inlined_kernel
-def note_head(time, settings, state, contacts, car, memory, head_contact, summary):
-    """Note the head's first contact with the car and its deepest place in it."""
-    head = settings.head
-    deepest = summary[S_HEAD_DEPTH]
-    for j in range(contacts.zone_force.shape[0] - 1):
-        if contacts.segment_force[head, j] <= 0.0:
-            continue
-        if memory[M_TOUCHED] == 0.0:
-            memory[M_TOUCHED] = 1.0
-            head_contact[0] = time
-            head_contact[1] = state[head, SPEED_X] - car[3]
-            head_contact[2] = 0.0
-            head_contact[3] = state[head, SPEED_Z]
-            for k in range(3):
-                head_contact[4 + k] = contacts.normal[head, j, k]
-        if contacts.largest[head, j] > deepest and summary[S_GROUND_TIME] == math.inf:
-            deepest = contacts.largest[head, j]
-            summary[S_HEAD_ZONE] = float(j)
-            for k in range(3):
-                head_contact[7 + k] = contacts.point[head, j, k]
-    summary[S_HEAD_DEPTH] = deepest
+        orientation[i, 0] = c * w - s * y
+        orientation[i, 1] = c * x + s * z
+        orientation[i, 2] = c * y + s * w
+        orientation[i, 3] = c * z - s * x
+    write_frame(row, time, orientation, contacts, car, frames)
+    for i in range(body.mass.shape[0]):
+        frames[row, Frame.POSES + 7 * i + 1] = body.side[i]
 
 
 @inlined_kernel
@@ -138,18 +90,22 @@ def lands(settings, motion, contacts, ahead, any_segment):
 
 
 @inlined_kernel
-def note_landing(time, settings, motion, contacts, memory, summary):
+def note_landing(time, settings, data):
     """Note when trunk or head lands, and when the road begins to act on the head's signals.
 
     That is when any segment lands after the body, its head having met the car, was in the air.
     """
+    motion, contacts, memory, summary = data.motion, data.contacts, data.memory, data.summary
     coarse = settings.coarse * settings.tick
-    if summary[S_GROUND_TIME] == math.inf and lands(settings, motion, contacts, coarse, False):
-        summary[S_GROUND_TIME] = time
-        memory[M_ROAD_TIME] = min(memory[M_ROAD_TIME], time)
-    if memory[M_TOUCHED] > 0.0 and memory[M_ROAD_TIME] == math.inf:
+    if summary[Summary.GROUND_TIME] == math.inf and (
+        lands(settings, motion, contacts, coarse, False)
+    ):
+        summary[Summary.GROUND_TIME] = time
+        memory[Memory.ROAD_TIME] = min(memory[Memory.ROAD_TIME], time)
+    met = math.isfinite(data.head_contact[HeadContact.TIME])
+    if met and memory[Memory.ROAD_TIME] == math.inf:
         low = lands(settings, motion, contacts, coarse, True)
-        if low and memory[M_AIRBORNE] > 0.0:
-            memory[M_ROAD_TIME] = time
+        if low and memory[Memory.AIRBORNE] > 0.0:
+            memory[Memory.ROAD_TIME] = time
         elif not low:
-            memory[M_AIRBORNE] = 1.0
+            memory[Memory.AIRBORNE] = 1.0

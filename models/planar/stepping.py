@@ -7,44 +7,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.compilation import inlined_kernel, kernel
+from models.contact.road import Road
 from models.crash.body_contact import apply_self_contacts
-from models.crash.car_contact import apply_car_contacts, zone_separation
-from models.crash.record import (
-    NOT_FINITE,
-    REST,
-    REST_ON_CAR,
-    REST_SPEED,
-    REST_SPREAD,
-    REST_TIME,
-    S_CENTRE_SPEED,
-    S_FRAMES,
-    S_REASON,
-    S_RECORDS,
-    S_STEPS,
-    S_TIME,
-    STEP_LIMIT,
-    TIME_LIMIT,
+from models.crash.car_contact import apply_car_contacts
+from models.crash.ellipsoids import Ellipsoids
+from models.crash.front import patch_count, separation_of
+from models.crash.record import GOES_ON, EndReason, HeadContact
+from models.crash.recorder import (
+    limit_reason,
+    note_head,
+    rest_reason,
+    speeds_of,
+    time_at_rest,
+    write_end,
 )
 from models.crash.stepping import HEAD_NEAR, head_meets_car
+from models.crash.surfaces import Contacts
+from models.planar.body import PlanarBody
 from models.planar.bushings import add_bushings
-from models.planar.recording import (
-    M_LENGTH,
-    M_QUIET,
-    M_ROAD_TIME,
-    M_ROWS,
-    M_SHOTS,
-    M_SPEED_X,
-    M_SPEED_Z,
-    M_SPIN,
-    M_STEPS,
-    M_TICKS,
-    M_TOUCHED,
-    lands,
-    note_head,
-    note_landing,
-    write_frame,
-    write_record,
-)
+from models.planar.joints import PlanarJoints
+from models.planar.recording import Memory, lands, note_landing, write_poses, write_row
 from models.planar.space import (
     ANGLE,
     FORCE_X,
@@ -55,10 +37,12 @@ from models.planar.space import (
     SPEED_Z,
     SPIN,
     TORQUE,
+    Link,
     X,
     Z,
 )
-from models.vehicle.motion import car_state
+from models.vehicle.motion import CarMotion, car_state
+from models.vehicle.zones import Zones
 
 Array = NDArray[np.float64]
 
@@ -103,6 +87,56 @@ class PlanarSettings(NamedTuple):
     frame_every: int
     head: int
     trunk: int
+
+
+class PlanarModel(NamedTuple):
+    """What does not change in a run.
+
+    Attributes
+    ----------
+    link : of the space. body, joints, ellipsoids : of the body held in the plane.
+    front : geometry of the car's front, one of the types of ``models.crash.front``.
+    road, car_motion : of the surroundings.
+    settings : of the step loop.
+    """
+
+    link: Link
+    body: PlanarBody
+    joints: PlanarJoints
+    ellipsoids: Ellipsoids
+    front: Zones
+    road: Road
+    car_motion: CarMotion
+    settings: PlanarSettings
+
+
+class PlanarData(NamedTuple):
+    """State, loads, workspace and what is written down; all of it changes in a run.
+
+    Attributes
+    ----------
+    state, given : of the space.
+    motion, loads, contacts : of the body, as the contacts read them.
+    orientation : (n, 4) workspace of the frames.
+    car : as in ``models.vehicle.motion``. power : (channels,) workspace.
+    memory : from step to step; see ``Memory``. blow : never filled, as arms let the head pass.
+    record, frames, head_contact, summary : as in ``models.crash.record``; road forces are NaN.
+    """
+
+    state: Array
+    given: Array
+    motion: PlanarMotion
+    loads: PlanarLoads
+    contacts: Contacts
+    orientation: Array
+    car: Array
+    power: Array
+    memory: Array
+    blow: Array
+    record: Array
+    frames: Array
+    head_contact: Array
+    summary: Array
 
 
 def empty_motion(n: int) -> PlanarMotion:
@@ -154,34 +188,23 @@ def _add_joint_torques(body, table, state, ahead, given):
 
 
 @inlined_kernel
-def _speeds(body, state):
-    """Return the speed of the centre of gravity and the root mean square segment speed."""
-    total, x, z, square = 0.0, 0.0, 0.0, 0.0
-    for i in range(body.mass.shape[0]):
-        m, vx, vz = body.mass[i], state[i, SPEED_X], state[i, SPEED_Z]
-        total += m
-        x += m * vx
-        z += m * vz
-        square += m * (vx * vx + vz * vz)
-    return math.hypot(x, z) / total, math.sqrt(square / total)
-
-
-@inlined_kernel
-def _is_near(head, ellipsoids, zones, car, contacts):
-    """Return whether the head is within ``HEAD_NEAR`` of a zone."""
-    x, z = contacts.centre[head, 0] - car[0], contacts.centre[head, 2]
-    for j in range(zones.radius.shape[0]):
-        found = zone_separation(zones, ellipsoids, contacts, j, head, x, 0.0, z, 1.0, 0.0)
+def _head_is_near(model, data):
+    """Return whether the head is within ``HEAD_NEAR`` of the car's front."""
+    head, contacts = model.settings.head, data.contacts
+    x, z = contacts.centre[head, 0] - data.car[0], contacts.centre[head, 2]
+    for j in range(patch_count(model.front)):
+        found = separation_of(model.front, model.ellipsoids, contacts, j, head, x, 0.0, z, 1.0, 0.0)
         if found[0] < HEAD_NEAR:
             return True
     return False
 
 
 @inlined_kernel
-def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts, landed):
-    head = settings.head
-    if head_meets_car(head, ellipsoids, zones, car, motion, contacts) and (
-        _is_near(head, ellipsoids, zones, car, contacts)
+def _ticks_of_next_step(model, data, landed):
+    settings, ellipsoids = model.settings, model.ellipsoids
+    car, motion, contacts = data.car, data.motion, data.contacts
+    if head_meets_car(settings.head, ellipsoids, model.front, car, motion, contacts) and (
+        _head_is_near(model, data)
     ):
         return 1
     for j in range(contacts.zone_force.shape[0] - 1):
@@ -196,14 +219,15 @@ def _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts, land
 
 
 @inlined_kernel
-def _apply_loads(
-    body, joints, ellipsoids, zones, state, ahead, given, motion, loads, contacts, car, power
-):  # fmt: skip
+def _apply_loads(model, data, ahead):
     """Write the loads of a step of ``ahead`` s, and every body's own velocity.
 
     Chipmunk moves the bodies at their old velocities before it changes these, so the forces are
     those where the bodies will then be: explicit Euler becomes the symplectic one.
     """
+    body, ellipsoids = model.body, model.ellipsoids
+    state, given, motion, loads = data.state, data.given, data.motion, data.loads
+    contacts, power = data.contacts, data.power
     update_motion(body, state, ahead, motion, contacts)
     for j in range(contacts.zone_force.shape[0]):
         contacts.zone_force[j] = 0.0
@@ -212,102 +236,97 @@ def _apply_loads(
         for k in range(3):
             loads.force[i, k] = 0.0
             loads.torque[i, k] = 0.0
-    apply_car_contacts(zones, ellipsoids, car, motion, loads, contacts, body, power)
+    apply_car_contacts(model.front, ellipsoids, data.car, motion, loads, contacts, body, power)
     apply_self_contacts(ellipsoids, motion, loads, contacts, body, power)
     for i in range(n):
         given[i, FORCE_X], given[i, FORCE_Z] = loads.force[i, 0], loads.force[i, 2]
         given[i, TORQUE] = -loads.torque[i, 1]
         given[i, GIVEN_X], given[i, GIVEN_Z] = state[i, SPEED_X], state[i, SPEED_Z]
-    _add_joint_torques(body, joints.torque, state, ahead, given)
-    add_bushings(body, joints, state, ahead, given)
+    _add_joint_torques(body, model.joints.torque, state, ahead, given)
+    add_bushings(body, model.joints, state, ahead, given)
 
 
 @inlined_kernel
-def _end_reason(settings, body, state, contacts, memory, time):
-    """Return why the run ends now, -1 if it goes on."""
-    speed, spread = _speeds(body, state)
-    quiet = speed < REST_SPEED and spread < REST_SPREAD
-    memory[M_QUIET] = memory[M_QUIET] + memory[M_LENGTH] if quiet else 0.0
+def _end_reason(model, data, time):
+    """Return why the run ends now, ``GOES_ON`` if it does not."""
+    memory = data.memory
+    speed, spread = speeds_of(model.body.mass, data.motion)
+    memory[Memory.QUIET] = time_at_rest(speed, spread, memory[Memory.LENGTH], memory[Memory.QUIET])
     # Chipmunk ends the whole process where it meets a number that is none.
     if not spread < FASTEST:
-        return NOT_FINITE
-    if memory[M_QUIET] >= REST_TIME:
-        for j in range(contacts.zone_force.shape[0] - 1):
-            if contacts.zone_force[j] > 0.0:
-                return REST_ON_CAR
-        return REST
-    if time >= settings.time_limit:
-        return TIME_LIMIT
-    if memory[M_STEPS] >= settings.step_limit:
-        return STEP_LIMIT
-    return -1
+        return EndReason.NOT_FINITE.value
+    reason = rest_reason(memory[Memory.QUIET], data.contacts)
+    if reason != GOES_ON:
+        return reason
+    return limit_reason(time, memory[Memory.STEPS], model.settings)
+
+
+@inlined_kernel
+def _step(step_space, each_body, model, data, length):
+    """Advance the space by a step of ``length`` (s)."""
+    link, state, memory = model.link, data.state, data.memory
+    head = model.settings.head
+    memory[Memory.SPEED_X], memory[Memory.SPEED_Z] = state[head, SPEED_X], state[head, SPEED_Z]
+    memory[Memory.SPIN], memory[Memory.LENGTH] = state[head, SPIN], length
+    # The mean speed brings the car exactly to where it is at the step's end.
+    car_state(model.car_motion, memory[Memory.TICKS] * model.settings.tick, data.car)
+    _apply_loads(model, data, length)
+    data.given[link.car, GIVEN_X] = (data.car[0] - state[link.car, X]) / length
+    link.write_place[0] = 0
+    each_body(link.space, link.writer, link.write_data)
+    step_space(link.space, length)
+    link.read_place[0] = 0
+    each_body(link.space, link.reader, link.read_data)
 
 
 @kernel
-def simulate(
-    step_space, each_body, link, body, joints, ellipsoids, zones, road, car_motion, settings,
-    state, given, motion, loads, contacts, car, power, memory,
-    record, frames, head_contact, summary,
-):  # fmt: skip
+def simulate(step_space, each_body, model, data):
     """Run a space from its present state to rest.
 
     Parameters
     ----------
-    step_space, each_body : as in ``models.planar.chipmunk``. link : of the space.
-    body, joints, ellipsoids, zones, road, car_motion, settings : constant data.
-    state, given : of the space, changed in place.
-    motion, loads, contacts, car, power, memory : workspace; car as in ``models.vehicle.motion``.
-    record, frames, head_contact, summary : as in ``models.multibody.simulation``; road forces are
-        NaN.
+    step_space, each_body : callables
+        As in ``models.planar.chipmunk``.
+    model : PlanarModel
+    data : PlanarData
+        Changed in place; record, frames, head contact and summary are filled.
     """
-    head = settings.head
-    reason = -1
-    car_state(car_motion, 0.0, car)
-    _apply_loads(
-        body, joints, ellipsoids, zones, state, 0.0, given, motion, loads, contacts, car, power
-    )
+    settings, memory, contacts = model.settings, data.memory, data.contacts
+    car_state(model.car_motion, 0.0, data.car)
+    _apply_loads(model, data, 0.0)
     while True:
-        time = memory[M_TICKS] * settings.tick
-        update_motion(body, state, 0.0, motion, contacts)
-        row = int(memory[M_ROWS])
-        if row < record.shape[0]:
-            write_record(row, time, body, road, settings, state, contacts, car, memory, record)
-            memory[M_ROWS] += 1.0
-        shot = int(memory[M_SHOTS])
-        if memory[M_TICKS] >= shot * settings.frame_every and shot < frames.shape[0]:
-            write_frame(shot, time, body, state, contacts, car, frames)
-            memory[M_SHOTS] += 1.0
-        note_head(time, settings, state, contacts, car, memory, head_contact, summary)
-        note_landing(time, settings, motion, contacts, memory, summary)
-        reason = _end_reason(settings, body, state, contacts, memory, time)
-        if reason >= 0:
-            break
-        landed = memory[M_ROAD_TIME] < math.inf or memory[M_TOUCHED] == 0.0
-        ticks = _ticks_of_next_step(settings, ellipsoids, zones, car, motion, contacts, landed)
-        length = ticks * settings.tick
-        memory[M_SPEED_X], memory[M_SPEED_Z] = state[head, SPEED_X], state[head, SPEED_Z]
-        memory[M_SPIN], memory[M_LENGTH] = state[head, SPIN], length
-        memory[M_TICKS] += ticks
-        memory[M_STEPS] += 1.0
-        # The mean speed brings the car exactly to where it is at the step's end.
-        car_state(car_motion, memory[M_TICKS] * settings.tick, car)
-        _apply_loads(
-            body, joints, ellipsoids, zones, state, length, given,
-            motion, loads, contacts, car, power,
+        time = memory[Memory.TICKS] * settings.tick
+        update_motion(model.body, data.state, 0.0, data.motion, contacts)
+        row = int(memory[Memory.ROWS])
+        if row < data.record.shape[0]:
+            write_row(row, time, model, data)
+            memory[Memory.ROWS] += 1.0
+        shot = int(memory[Memory.SHOTS])
+        if memory[Memory.TICKS] >= shot * settings.frame_every and shot < data.frames.shape[0]:
+            write_poses(
+                shot, time, model.body, data.state, data.orientation, contacts, data.car,
+                data.frames,
+            )  # fmt: skip
+            memory[Memory.SHOTS] += 1.0
+        note_head(
+            time, settings.head, data.motion, contacts, data.car, data.blow, data.head_contact,
+            data.summary,
         )  # fmt: skip
-        given[link.car, GIVEN_X] = (car[0] - state[link.car, X]) / length
-        link.write_place[0] = 0
-        each_body(link.space, link.writer, link.write_data)
-        step_space(link.space, length)
-        link.read_place[0] = 0
-        each_body(link.space, link.reader, link.read_data)
-    speed, _ = _speeds(body, state)
-    summary[S_REASON] = float(reason)
-    summary[S_TIME] = time
-    summary[S_STEPS] = memory[M_STEPS]
-    summary[S_RECORDS] = memory[M_ROWS]
-    summary[S_FRAMES] = memory[M_SHOTS]
-    summary[S_CENTRE_SPEED] = speed
+        note_landing(time, settings, data)
+        reason = _end_reason(model, data, time)
+        if reason != GOES_ON:
+            break
+        met = math.isfinite(data.head_contact[HeadContact.TIME])
+        landed = memory[Memory.ROAD_TIME] < math.inf or not met
+        ticks = _ticks_of_next_step(model, data, landed)
+        memory[Memory.TICKS] += ticks
+        memory[Memory.STEPS] += 1.0
+        _step(step_space, each_body, model, data, ticks * settings.tick)
+    speed, _ = speeds_of(model.body.mass, data.motion)
+    write_end(
+        reason, time, memory[Memory.STEPS], memory[Memory.ROWS], memory[Memory.SHOTS], speed,
+        data.summary,
+    )  # fmt: skip
 
 
 @kernel

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from models.compilation import kernel
-from models.crash.record import S_STEPS
+from models.crash.record import Summary
 from models.criteria import head_injury_criterion
 from models.multibody.integration import correct, empty_memory, predict
 from models.multibody.kinematics import update_kinematics
@@ -114,7 +114,7 @@ def test_whole_crash(benchmark: Any) -> None:
         return (build_crash(values, model.vehicle), values), {}
 
     def crash(setup: Any, inputs: dict[str, float]) -> None:
-        steps.append(model.follow(setup, inputs).summary[S_STEPS])
+        steps.append(model.follow(setup, inputs).summary[Summary.STEPS])
 
     # The step loop changes the state that it is given, so every round starts from a new one.
     benchmark.pedantic(crash, setup=assembled, rounds=20, warmup_rounds=1)

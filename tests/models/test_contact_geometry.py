@@ -10,9 +10,9 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from models.contact.geometry import ellipsoid_direction, roll_direction, shape_matrix
-from models.crash.car_contact import zone_separation
 from models.crash.ellipsoids import Ellipsoids
 from models.crash.surfaces import Contacts, empty_contacts
+from models.crash.zone_front import zone_separation
 from models.vehicle.zones import PANEL, ROLL, Zones
 
 FOREARM = (0.028, 0.028, 0.165)

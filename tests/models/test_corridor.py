@@ -249,9 +249,7 @@ def any_curves(draw: st.DrawFn) -> list[ForceCurve]:
 
 @quiet(12)
 @given(any_curves(), st.sampled_from(["quantiles", "components"]))
-def test_any_curves_give_a_corridor_that_can_be_used(
-    curves: list[ForceCurve], method: str
-) -> None:
+def test_any_curves_give_a_corridor_that_can_be_used(curves: list[ForceCurve], method: str) -> None:
     corridor = build_corridor(curves, method)
     depth = np.linspace(0.0, 1.2 * corridor.median.penetration[-1], 60)
     for coordinate in (0.0, 0.2, 0.5, 0.8, 1.0):
@@ -318,11 +316,11 @@ MEDIAN = "[[0, 0], [0.05, 2000], [0.1, 3000]]"
         ("zones.", "zone.", "zones"),
         (GOOD, "zones = 3", "zones"),
         (GOOD, "[zones]\nhood = 3", "zones"),
-        (GOOD, GOOD + "]", ""),
-        (GOOD, GOOD[: len(GOOD) // 2], ""),
-        (GOOD, GOOD + "\n[zones.hood]\n", ""),
-        (GOOD, "a = " + "[" * 300 + "\n", ""),
-        (GOOD, "a = " + "[" * 5000 + "]" * 5000, ""),
+        (GOOD, GOOD + "]", "^corridor "),
+        (GOOD, GOOD[: len(GOOD) // 2], "^corridor "),
+        (GOOD, GOOD + "\n[zones.hood]\n", "^corridor "),
+        (GOOD, "a = " + "[" * 300 + "\n", "^corridor "),
+        (GOOD, "a = " + "[" * 5000 + "]" * 5000, "^corridor "),
         ("lower", "lowest", "lower is missing"),
         ("unloading_ratio", "ratio", "unloading_ratio is missing"),
         ("ratio = 7", "ratio = 0.9", "unloading_ratio must exceed 1"),
@@ -339,9 +337,7 @@ MEDIAN = "[[0, 0], [0.05, 2000], [0.1, 3000]]"
         (MEDIAN, "{ a = 1 }", "median: "),
     ],
 )
-def test_bad_files_are_named_in_one_line(
-    tmp_path: Path, old: str, new: str, message: str
-) -> None:
+def test_bad_files_are_named_in_one_line(tmp_path: Path, old: str, new: str, message: str) -> None:
     assert old in GOOD
     path = tmp_path / "bad.toml"
     path.write_text(GOOD.replace(old, new))

@@ -9,10 +9,10 @@ from builders import GRAVITY
 
 from models.compilation import kernel
 from models.crash.model import TICK
-from models.crash.record import S_GROUND_TIME, SUMMARY
+from models.crash.record import BLOW_ENTRIES, Blow, Summary
+from models.crash.recorder import note_blow, note_head
 from models.crash.surfaces import empty_contacts
 from models.multibody.model import MultibodyModel
-from models.multibody.recording import B_LAST, BLOW, note_blow, note_head
 from models.multibody.setup import build_crash
 from models.pedestrian.anthropometry import HEAD, SEGMENTS
 from models.planar.model import PlanarModel
@@ -268,9 +268,9 @@ def test_the_arm_counts_if_it_braked_the_head(
     zones = crash.scenario.zones.radius.size
     contacts = empty_contacts(len(SEGMENTS), zones, len(ellipsoids.pairs))
     pair = next(k for k, row in enumerate(ellipsoids.pairs) if HEAD in row[:2])
-    blow, head_contact = np.zeros(BLOW), np.full(10, np.nan)
-    summary, car = np.zeros(SUMMARY), np.zeros(6)
-    blow[B_LAST], summary[S_GROUND_TIME] = -math.inf, math.inf
+    blow, head_contact = np.zeros(BLOW_ENTRIES), np.full(10, np.nan)
+    summary, car = np.zeros(len(Summary)), np.zeros(6)
+    blow[Blow.LAST], summary[Summary.GROUND_TIME] = -math.inf, math.inf
     met = 0.060
     for time in np.arange(0.0, met + 5e-4, 1e-3):
         # The head slows down all the time.

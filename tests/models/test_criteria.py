@@ -126,7 +126,7 @@ def test_order_and_scale_of_clips(levels: list[float], duration: float, factor: 
         ([0.0, 1.0, 2.0], [1.0, 2.0], "cumulative", "equal, 1-D"),
         ([0.0], [1.0], "cumulative", "equal, 1-D"),
         ([0.0, 0.0], [1.0, 2.0], "cumulative", "rising"),
-        ([0.0, math.nan, 1.0], [1.0, 2.0, 3.0], "cumulative", ""),
+        ([0.0, math.nan, 1.0], [1.0, 2.0, 3.0], "cumulative", "time"),
         ([0.0, 1.0], [1.0, math.nan], "cumulative", "finite"),
         ([0.0, 1.0], [1.0, 2.0], "single", "mode"),
     ],

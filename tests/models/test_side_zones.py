@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from models.contact.law import ForceCurve
-from models.crash.car_contact import BORDER, ENTRY_DEPTH, apply_car_contacts, zone_separation
+from models.crash.car_contact import ENTRY_DEPTH, apply_car_contacts
 from models.crash.scenario import Scenario, build_scenario
 from models.crash.surfaces import Contacts, empty_contacts
+from models.crash.zone_front import BORDER, zone_separation
 from models.multibody.model import MultibodyModel
 from models.multibody.setup import build_tree
 from models.multibody.tree import empty_loads, empty_motion

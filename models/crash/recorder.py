@@ -1,0 +1,180 @@
+"""What every crash model writes down between steps: record, frames, head contact, landing, rest."""
+
+import math
+
+from models.compilation import inlined_kernel
+from models.crash.car_contact import car_force_of
+from models.crash.record import (
+    GOES_ON,
+    REST_SPEED,
+    REST_SPREAD,
+    REST_TIME,
+    Blow,
+    Column,
+    EndReason,
+    Frame,
+    HeadContact,
+    Summary,
+)
+
+BLOW_GAP = 0.01
+"""s without force after which the head's next contact with an arm is another blow (assumed)."""
+BLOW_FORCE = 300.0
+"""N that an arm must have put on the head to count as the head's first blow (assumed)."""
+
+
+@inlined_kernel
+def relative_velocity(head, motion, car):
+    """Return the velocity of the head's centre of mass relative to the car-fixed point where it is.
+
+    In car axes, m/s.
+    """
+    ux = motion.velocity[head, 0] - car[3] + car[5] * (motion.centre[head, 1] - car[1])
+    uy = motion.velocity[head, 1] - car[4] - car[5] * (motion.centre[head, 0] - car[0])
+    cosine, sine = math.cos(car[2]), math.sin(car[2])
+    return cosine * ux + sine * uy, -sine * ux + cosine * uy, motion.velocity[head, 2]
+
+
+@inlined_kernel
+def note_blow(time, head, ellipsoids, motion, contacts, car, blow):
+    """Note when and how fast the head ran into an arm; one blow lasts until a gap of force."""
+    force = 0.0
+    for k in range(ellipsoids.pairs.shape[0]):
+        if ellipsoids.pairs[k, 0] == head or ellipsoids.pairs[k, 1] == head:
+            force += contacts.pair_force[k]
+    if force <= 0.0:
+        return
+    if time - blow[Blow.LAST] > BLOW_GAP:
+        blow[Blow.START], blow[Blow.PEAK] = time, 0.0
+        ux, uy, uz = relative_velocity(head, motion, car)
+        blow[Blow.VELOCITY], blow[Blow.VELOCITY + 1], blow[Blow.VELOCITY + 2] = ux, uy, uz
+    blow[Blow.LAST] = time
+    blow[Blow.PEAK] = max(blow[Blow.PEAK], force)
+
+
+@inlined_kernel
+def note_head(time, head, motion, contacts, car, blow, head_contact, summary):
+    """Note the head's first contact with the car and its deepest place in it.
+
+    Its speed is that of the first blow: where the head lies on an arm that lies on the car, the
+    arm has braked it before. A model whose arms let the head pass leaves ``blow`` as it is.
+    """
+    deepest = summary[Summary.HEAD_DEPTH]
+    for j in range(contacts.zone_force.shape[0] - 1):
+        if contacts.segment_force[head, j] <= 0.0:
+            continue
+        if not math.isfinite(head_contact[HeadContact.TIME]):
+            head_contact[HeadContact.TIME] = time
+            ux, uy, uz = relative_velocity(head, motion, car)
+            if time - blow[Blow.LAST] <= BLOW_GAP and blow[Blow.PEAK] >= BLOW_FORCE:
+                ux = blow[Blow.VELOCITY]
+                uy = blow[Blow.VELOCITY + 1]
+                uz = blow[Blow.VELOCITY + 2]
+            head_contact[HeadContact.VELOCITY] = ux
+            head_contact[HeadContact.VELOCITY + 1] = uy
+            head_contact[HeadContact.VELOCITY + 2] = uz
+            for k in range(3):
+                head_contact[HeadContact.NORMAL + k] = contacts.normal[head, j, k]
+        if contacts.largest[head, j] > deepest and summary[Summary.GROUND_TIME] == math.inf:
+            deepest = contacts.largest[head, j]
+            summary[Summary.HEAD_REGION] = float(j)
+            for k in range(3):
+                head_contact[HeadContact.POINT + k] = contacts.point[head, j, k]
+    summary[Summary.HEAD_DEPTH] = deepest
+
+
+@inlined_kernel
+def write_contact_forces(row, time, head, motion, contacts, car, record):
+    """Write time, head velocity and forces of a row of the record."""
+    record[row, Column.TIME] = time
+    ux, uy, uz = relative_velocity(head, motion, car)
+    record[row, Column.RELATIVE_VELOCITY] = ux
+    record[row, Column.RELATIVE_VELOCITY + 1] = uy
+    record[row, Column.RELATIVE_VELOCITY + 2] = uz
+    road = contacts.zone_force.shape[0] - 1
+    for j in range(road + 1):
+        record[row, Column.REGION_FORCE + j] = contacts.zone_force[j]
+    record[row, Column.HEAD_CAR_FORCE] = car_force_of(contacts, head)
+    record[row, Column.HEAD_ROAD_FORCE] = contacts.segment_force[head, road]
+
+
+@inlined_kernel
+def write_centre(row, mass, motion, record):
+    """Write the centre of gravity of a row of the record."""
+    total = 0.0
+    for k in range(3):
+        record[row, Column.CENTRE + k] = 0.0
+    for i in range(mass.shape[0]):
+        total += mass[i]
+        for k in range(3):
+            record[row, Column.CENTRE + k] += mass[i] * motion.centre[i, k]
+    for k in range(3):
+        record[row, Column.CENTRE + k] /= total
+
+
+@inlined_kernel
+def write_frame(row, time, orientation, contacts, car, frames):
+    """Write a frame: time, the car's place and yaw, ellipsoid centres and quaternions."""
+    frames[row, Frame.TIME] = time
+    for k in range(3):
+        frames[row, Frame.CAR + k] = car[k]
+    for i in range(orientation.shape[0]):
+        first = Frame.POSES + 7 * i
+        for k in range(3):
+            frames[row, first + k] = contacts.centre[i, k]
+        for k in range(4):
+            frames[row, first + 3 + k] = orientation[i, k]
+
+
+@inlined_kernel
+def speeds_of(mass, motion):
+    """Return the speed of the centre of gravity and the root mean square segment speed (m/s)."""
+    total, square = 0.0, 0.0
+    px, py, pz = 0.0, 0.0, 0.0
+    for i in range(mass.shape[0]):
+        m = mass[i]
+        vx, vy, vz = motion.velocity[i, 0], motion.velocity[i, 1], motion.velocity[i, 2]
+        total += m
+        px += m * vx
+        py += m * vy
+        pz += m * vz
+        square += m * (vx * vx + vy * vy + vz * vz)
+    return math.sqrt(px * px + py * py + pz * pz) / total, math.sqrt(square / total)
+
+
+@inlined_kernel
+def time_at_rest(speed, spread, length, before):
+    """Return for how long (s) a body has been at rest after a step of ``length`` s."""
+    return before + length if speed < REST_SPEED and spread < REST_SPREAD else 0.0
+
+
+@inlined_kernel
+def rest_reason(quiet, contacts):
+    """Return why a body that has been at rest for ``quiet`` s ends the run, if it does."""
+    if quiet < REST_TIME:
+        return GOES_ON
+    for j in range(contacts.zone_force.shape[0] - 1):
+        if contacts.zone_force[j] > 0.0:
+            return EndReason.REST_ON_CAR.value
+    return EndReason.REST_ON_ROAD.value
+
+
+@inlined_kernel
+def limit_reason(time, steps, settings):
+    """Return which limit ends the run, if one does."""
+    if time >= settings.time_limit:
+        return EndReason.TIME_LIMIT.value
+    if steps >= settings.step_limit:
+        return EndReason.STEP_LIMIT.value
+    return GOES_ON
+
+
+@inlined_kernel
+def write_end(reason, time, steps, rows, shots, speed, summary):
+    """Write why and when a run ended, and what was written until then."""
+    summary[Summary.END_REASON] = float(reason)
+    summary[Summary.TIME] = time
+    summary[Summary.STEPS] = float(steps)
+    summary[Summary.RECORDS] = float(rows)
+    summary[Summary.FRAMES] = float(shots)
+    summary[Summary.CENTRE_SPEED] = speed

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from models.protocol import Array, Batch, Input, Model, Output, complete_inputs
+from models.protocol import Array, Batch, Channel, Input, Model, Output, complete_inputs
 
 
 def read_inputs(table: dict[str, Any]) -> tuple[Input, ...]:
@@ -27,6 +27,14 @@ def read_inputs(table: dict[str, Any]) -> tuple[Input, ...]:
 def read_outputs(table: dict[str, Any]) -> tuple[Output, ...]:
     """Return the outputs of the ``[outputs]`` table of a model's data file."""
     return tuple(Output(name, *row) for name, row in table["outputs"].items())
+
+
+def read_channels(table: dict[str, Any]) -> dict[str, Channel]:
+    """Return the channels of the ``[channels]`` tables of a model's data file, by name."""
+    return {
+        name: Channel(**{**row, "outputs": tuple(row.get("outputs", ()))})
+        for name, row in table["channels"].items()
+    }
 
 
 def run_rows(

@@ -62,6 +62,29 @@ class Output:
 
 
 @dataclass(frozen=True)
+class Channel:
+    """A channel of the histories, ``<group>_<channel>``, that tests may measure.
+
+    Attributes
+    ----------
+    filter_option : str
+        Option of the model that sets the channel frequency class by which the model filters it;
+        empty if it leaves the channel as it is.
+    straight : str
+        Channel that is measured in its place in a straight impact, if there is one.
+    outputs : tuple of str
+        Outputs that follow from it: no evidence of their own.
+    code : str
+        ISO-MME channel code with ``{}`` for the device; empty if it has none.
+    """
+
+    filter_option: str = ""
+    straight: str = ""
+    outputs: tuple[str, ...] = ()
+    code: str = ""
+
+
+@dataclass(frozen=True)
 class History:
     """Time histories on one time axis.
 
@@ -109,6 +132,24 @@ def chosen_histories(
 
 
 @dataclass(frozen=True)
+class Mesh:
+    """A surface of facets in a scene.
+
+    Attributes
+    ----------
+    name : str
+    nodes : (f, k, 3) array
+        Places in world axes at each frame, m.
+    faces : (t, 3) or (t, 4) array
+        Nodes of each facet.
+    """
+
+    name: str
+    nodes: Array
+    faces: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
 class Scene:
     """What a picture of a run needs.
 
@@ -120,6 +161,7 @@ class Scene:
     car : (f, 3) x, y (m) and yaw (rad) of the car's frame.
     outline : list of (k, 2) lines x, z (m) of the car's side view in its frame.
     plan : (k, 2) x, y (m), outline of the car from above in its frame.
+    meshes : surfaces of facets, drawn behind the ellipsoids.
     """
 
     time: Array
@@ -130,6 +172,7 @@ class Scene:
     car: Array
     outline: Sequence[Array]
     plan: Array
+    meshes: Sequence[Mesh] = ()
 
 
 @dataclass(frozen=True)
@@ -184,6 +227,22 @@ class Model(Protocol):
     @property
     def partial_status(self) -> frozenset[str]:
         """Statuses of complete runs in which some outputs have no value."""
+
+    @property
+    def channels(self) -> Mapping[str, Channel]:
+        """What tests may measure, by name; other channels of the histories have no traits."""
+
+    @property
+    def isomme_device(self) -> str:
+        """Two letters of ISO/TS 13499 for the test object, empty if there are none."""
+
+    @property
+    def accidents(self) -> bool:
+        """Whether a run is a whole accident, whose scalars alone are measured."""
+
+    @property
+    def cost(self) -> float:
+        """CPU time of a run in s, about."""
 
     def run(self, inputs: Mapping[str, float]) -> Run:
         """Run once, with time histories; inputs left out take their nominal values."""

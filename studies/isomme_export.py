@@ -5,24 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from mcstudy.measurement import isomme
-from models.protocol import Run
+from models.protocol import Model, Run
 
 FEWEST = 8
 """Samples that an impact with the road takes at least."""
-# Dummy or impactor without a seat; child headform and virtual child of six in the code list of
-# ISO/TS 13499, which knows no pedestrian of seven.
-_DEVICE = {"headform": "PC", "multibody": "V6"}
-_CODES = {
-    ("head", "acceleration"): "D0HEADCG00{}ACRA",
-    ("head", "angular_velocity_x"): "D0HEADCG00{}AVXC",
-    ("head", "angular_velocity_y"): "D0HEADCG00{}AVYC",
-    ("head", "angular_velocity_z"): "D0HEADCG00{}AVZC",
-    ("head", "angular_acceleration"): "D0HEADCG00{}AARC",
-    ("head", "car_force"): "D0HEAD0000{}FOR0",
-    ("hood", "force"): "D0HEAD0000{}FOR0",
-}
-"""Channel codes by history group and channel."""
-
 
 CAR, ROAD = "car", "road"
 """Phases of a crash: up to the body's first contact with the road, and from it on."""
@@ -34,7 +20,7 @@ _PHASES = {
 }
 
 
-def write_isomme(run: Run, model: str, folder: Path, *, name: str, title: str) -> list[Path]:
+def write_isomme(run: Run, model: Model, folder: Path, *, name: str, title: str) -> list[Path]:
     """Write the head signals of a run as ISO-MME tests and return their ``.mme`` files.
 
     A crash is two tests, the impact with the car and that with the road: criteria of one head
@@ -42,7 +28,7 @@ def write_isomme(run: Run, model: str, folder: Path, *, name: str, title: str) -
 
     Parameters
     ----------
-    run : Run with histories. model : name of the model.
+    run : Run with histories. model : that it is of.
     folder : in which each test has a folder of its name.
     name, title : of the test; the impact with the road has ``_road`` behind its name.
 
@@ -51,7 +37,7 @@ def write_isomme(run: Run, model: str, folder: Path, *, name: str, title: str) -
     list of Path
         Empty if the model has no code in the format or the run no such history.
     """
-    if model not in _DEVICE or "head" not in run.histories:
+    if not model.isomme_device or "head" not in run.histories:
         return []
     time = run.histories["head"].time
     landing = run.outputs.get("ground_time", np.inf)
@@ -68,15 +54,17 @@ def write_isomme(run: Run, model: str, folder: Path, *, name: str, title: str) -
 
 
 def _write(
-    run: Run, model: str, folder: Path, phase: slice, name: str, title: str, comment: str
+    run: Run, model: Model, folder: Path, phase: slice, name: str, title: str, comment: str
 ) -> Path:
     channels = {}
     head = run.histories["head"].time
-    for (group, channel), code in _CODES.items():
+    for name, traits in model.channels.items():
+        group, _, channel = name.partition("_")
         history = run.histories.get(group)
-        if history is not None and channel in history.channels:
+        if traits.code and history is not None and channel in history.channels:
             values = history.channels[channel][phase]
-            channels[code.format(_DEVICE[model])] = (values, history.units[channel])
+            code = traits.code.format(model.isomme_device)
+            channels[code] = (values, history.units[channel])
     return isomme.write_test(
         folder,
         name,

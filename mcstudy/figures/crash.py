@@ -19,8 +19,17 @@ from mcstudy.figures import style
 Array = NDArray[np.float64]
 
 
+class MeshLike(Protocol):
+    """A surface of facets; see the model protocol."""
+
+    @property
+    def nodes(self) -> Array: ...
+    @property
+    def faces(self) -> NDArray[np.int64]: ...
+
+
 class SceneLike(Protocol):
-    """Poses of ellipsoids and car; see the model protocol."""
+    """Poses of ellipsoids, meshes and car; see the model protocol."""
 
     @property
     def time(self) -> Array: ...
@@ -38,8 +47,12 @@ class SceneLike(Protocol):
     def outline(self) -> Sequence[Array]: ...
     @property
     def plan(self) -> Array: ...
+    @property
+    def meshes(self) -> Sequence[MeshLike]: ...
 
 
+MESH = "#E4E9EC"
+"""Colour of facets."""
 _CIRCLE = np.stack(
     [np.cos(np.linspace(0.0, 2.0 * np.pi, 41)), np.sin(np.linspace(0.0, 2.0 * np.pi, 41))]
 )
@@ -88,6 +101,22 @@ def _draw_body(
     )
 
 
+def _draw_meshes(
+    axes: Axes, scene: SceneLike, frame: int, plane: tuple[int, int], shift: tuple[float, float]
+) -> None:
+    """Draw the facets of all meshes, far ones first."""
+    depth_axis = ({0, 1, 2} - set(plane)).pop()
+    for mesh in scene.meshes:
+        corners = mesh.nodes[frame][mesh.faces]
+        order = np.argsort(corners[:, :, depth_axis].mean(axis=1))
+        if plane == (0, 2):
+            order = order[::-1]
+        shapes = corners[order][:, :, list(plane)] - np.asarray(shift)
+        axes.add_collection(
+            PolyCollection(shapes, facecolors=MESH, edgecolors=style.GREY, linewidths=0.2)
+        )
+
+
 def _draw_car_side(axes: Axes, scene: SceneLike, x: float) -> None:
     for line in scene.outline:
         axes.plot(line[:, 0] + x, line[:, 1], color="#333333", linewidth=1.2)
@@ -107,8 +136,10 @@ def draw_strip(scene: SceneLike, times: Sequence[float]) -> Figure:
         row = figure.subplots(1, len(times), sharey=True, squeeze=False)[0]
         for axes, time in zip(row, times, strict=True):
             frame = int(np.argmin(np.abs(scene.time - time)))
+            car = (float(scene.car[frame, 0]), 0.0)
+            _draw_meshes(axes, scene, frame, (0, 2), car)
             _draw_car_side(axes, scene, 0.0)
-            _draw_body(axes, scene, frame, (0, 2), (float(scene.car[frame, 0]), 0.0))
+            _draw_body(axes, scene, frame, (0, 2), car)
             axes.axhline(0.0, color="#333333", linewidth=0.8)
             axes.set(xlim=(-1.25, 0.5), ylim=(-0.05, 1.55), aspect="equal")
             axes.set_title(f"{1e3 * scene.time[frame]:.0f} ms")
@@ -192,9 +223,11 @@ def write_animation(scene: SceneLike, path: Path, *, frames: int = 120) -> None:
             canvas.restore_region(background)  # type: ignore[no-untyped-call]
             clock = f"t = {1e3 * scene.time[frame]:.0f} ms"
             side.text(0.0, 1.03, clock, transform=side.transAxes, fontsize=12, clip_on=False)
+            _draw_meshes(side, scene, frame, (0, 2), (0.0, 0.0))
             _draw_car_side(side, scene, float(scene.car[frame, 0]))
             _draw_body(side, scene, frame, (0, 2), (0.0, 0.0))
             _draw_car_plan(above, scene, frame)
+            _draw_meshes(above, scene, frame, (0, 1), (0.0, 0.0))
             _draw_body(above, scene, frame, (0, 1), (0.0, 0.0))
             for artist in _artists(side, above):
                 if id(artist) not in still:

@@ -12,7 +12,7 @@ from models.crash.record import END_REASONS, Column, Frame, Summary
 from models.declaration import run_rows
 from models.effects.chain import build_chain
 from models.pedestrian.anthropometry import SEGMENTS, is_possible
-from models.protocol import OK, Batch, Input, Output, Run, complete_inputs
+from models.protocol import OK, Batch, Channel, Input, Output, Run, complete_inputs
 from models.vehicle.profile import Vehicle, load_vehicle
 
 Array = NDArray[np.float64]
@@ -40,6 +40,10 @@ class CrashModel(ABC):
         Name of a vehicle of the data folder.
     tick : float
         Finest step in s.
+    channel_class : float
+        Channel frequency class of the head's acceleration; 0 leaves it as it is.
+    angular_class : float
+        Channel frequency class of the head's angular velocity and acceleration; 0 leaves them.
     effects : mapping, optional
         By effect of the catalogue the values of its parameters; those left out take the median of
         their prior.
@@ -47,13 +51,18 @@ class CrashModel(ABC):
     Raises
     ------
     ValueError
-        If the vehicle or an effect is unknown or the step is not within 1 us to 0.2 ms.
+        If the vehicle or an effect is unknown, the step is not within 1 us to 0.2 ms, or a channel
+        frequency class is beyond what the sampling rate of 10 kHz allows.
     """
 
     name: str
     version: str
     outputs: tuple[Output, ...]
     effects: tuple[str, ...]
+    channels: Mapping[str, Channel]
+    isomme_device: str
+    accidents = True
+    cost: float
     partial_status = frozenset({NO_HEAD_CONTACT})
     _own_inputs: tuple[Input, ...]
 
@@ -61,10 +70,18 @@ class CrashModel(ABC):
         self,
         vehicle: str = "family_car_1990s",
         tick: float = TICK,
+        channel_class: float = outcome.LINEAR_CLASS,
+        angular_class: float = outcome.ANGULAR_CLASS,
         effects: Mapping[str, Mapping[str, float]] | None = None,
     ) -> None:
         if not 1e-6 <= float(tick) <= 2e-4:
             raise ValueError(f"tick must lie within 1e-6 and 2e-4 s, given {tick}")
+        self.classes = outcome.FilterClasses(float(channel_class), float(angular_class))
+        for option, value in (("channel_class", channel_class), ("angular_class", angular_class)):
+            if not 0.0 <= float(value) <= outcome.HIGHEST_CLASS:
+                raise ValueError(
+                    f"{option} must lie within 0 and {outcome.HIGHEST_CLASS:g}, given {value}"
+                )
         self.vehicle: Vehicle = load_vehicle(vehicle)
         self.tick = float(tick)
         self._chain = build_chain(self.name, effects)

@@ -45,8 +45,21 @@ LINEAR_CLASS = 1000.0
 ANGULAR_CLASS = 180.0
 """Channel frequency class of head angular velocity and acceleration (assumed; the standard leaves
 it to the user and the case does not state it)."""
+HIGHEST_CLASS = 2400.0
+"""Channel frequency class whose corner lies just below half the sampling rate."""
 SHORTEST_PHASE = 40
 """Samples below which a phase is too short to filter."""
+
+
+@dataclass(frozen=True)
+class FilterClasses:
+    """Channel frequency classes of the head's acceleration and of its angular signals, 0 for none.
+
+    A measured channel that passed another class is simulated with that class.
+    """
+
+    linear: float = LINEAR_CLASS
+    angular: float = ANGULAR_CLASS
 
 
 @dataclass(frozen=True)
@@ -64,6 +77,7 @@ class Raw:
     """
 
     scenario: Scenario
+    classes: FilterClasses
     chain: EffectChain
     values: Mapping[str, float]
     record: Array
@@ -107,19 +121,24 @@ class Signals:
     def acceleration(self) -> Array:
         """Resultant acceleration (n,) in g."""
         raw = self._raw
-        felt = Reading(self._motion[:, :3] / STANDARD_GRAVITY, LINEAR_CLASS)
+        felt = Reading(self._motion[:, :3] / STANDARD_GRAVITY, raw.classes.linear)
         read = record_reading(raw.chain, raw.values, felt, SAMPLING_RATE, origin=0)
         return resultant(read.acceleration)
+
+    def _angular(self, first: int) -> Array:
+        signal = self._motion[:, first : first + 3]
+        frequency_class = self._raw.classes.angular
+        return filter_cfc(signal, SAMPLING_RATE, frequency_class) if frequency_class else signal
 
     @functools.cached_property
     def spin(self) -> Array:
         """Angular velocity (n, 3) in rad/s, own axes."""
-        return filter_cfc(self._motion[:, 3:6], SAMPLING_RATE, ANGULAR_CLASS)
+        return self._angular(3)
 
     @functools.cached_property
     def spin_rate(self) -> Array:
         """Angular acceleration (n, 3) in rad/s2, own axes."""
-        return filter_cfc(self._motion[:, 6:], SAMPLING_RATE, ANGULAR_CLASS)
+        return self._angular(6)
 
 
 def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
@@ -201,7 +220,7 @@ def _head_contact(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
 
     def mass() -> float:
         car = slice(0, signals.split)
-        force = signals.sampled(Column.HEAD_CAR_FORCE, 1)[car, 0]
+        force = signals.sampled(Column.HEAD_CAR_FORCE, 1, signals.time[car])[:, 0]
         return effective_mass(signals.time[car], force, signals.acceleration[car])
 
     def intrusion() -> float:

@@ -44,58 +44,84 @@ def _sections(frequency_class: float, sampling_rate: float) -> Array:
 
 
 @inlined_kernel
-def _pass(section, values, start, step):
-    """Filter three columns in place, from the state that a constant of their first would leave.
+def _at_rest(section, x, y, z):
+    """Return the state that constants of three columns would leave.
+
+    The gain at frequency zero is one, so a constant goes through unchanged.
+    """
+    b0, b2, a2 = section[0], section[2], section[4]
+    first, second = 1.0 - b0, b2 - a2
+    return first * x, second * x, first * y, second * y, first * z, second * z
+
+
+@inlined_kernel
+def _next(section, x, y, z, state):
+    """Return the filtered samples of three columns and the state after them.
 
     Each sample waits for the one before it, so that three columns cost hardly more than one.
-
-    ``start`` is the first sample that is taken, ``step`` 1 or -1 the direction.
     """
     b0, b1, b2, a1, a2 = section[0], section[1], section[2], section[3], section[4]
-    # The gain at frequency zero is one, so a constant goes through unchanged.
-    first_0 = (1.0 - b0) * values[start, 0]
-    first_1 = (1.0 - b0) * values[start, 1]
-    first_2 = (1.0 - b0) * values[start, 2]
-    second_0 = (b2 - a2) * values[start, 0]
-    second_1 = (b2 - a2) * values[start, 1]
-    second_2 = (b2 - a2) * values[start, 2]
-    k = start
-    for _ in range(values.shape[0]):
-        x_0, x_1, x_2 = values[k, 0], values[k, 1], values[k, 2]
-        y_0 = b0 * x_0 + first_0
-        y_1 = b0 * x_1 + first_1
-        y_2 = b0 * x_2 + first_2
-        first_0 = b1 * x_0 - a1 * y_0 + second_0
-        first_1 = b1 * x_1 - a1 * y_1 + second_1
-        first_2 = b1 * x_2 - a1 * y_2 + second_2
-        second_0 = b2 * x_0 - a2 * y_0
-        second_1 = b2 * x_1 - a2 * y_1
-        second_2 = b2 * x_2 - a2 * y_2
-        values[k, 0] = y_0
-        values[k, 1] = y_1
-        values[k, 2] = y_2
-        k += step
+    u = b0 * x + state[0]
+    v = b0 * y + state[2]
+    w = b0 * z + state[4]
+    return (
+        (u, v, w),
+        (
+            b1 * x - a1 * u + state[1],
+            b2 * x - a2 * u,
+            b1 * y - a1 * v + state[3],
+            b2 * y - a2 * v,
+            b1 * z - a1 * w + state[5],
+            b2 * z - a2 * w,
+        ),
+    )
 
 
 @kernel
 def _there_and_back(section, signal, longer, filtered):
     """Filter the columns of a signal (n, k) into ``filtered``; ``longer`` is room for three."""
     n = signal.shape[0]
-    pad = (longer.shape[0] - n) // 2
-    for start in range(0, signal.shape[1], 3):
-        columns = min(3, signal.shape[1] - start)
-        for c in range(3):
-            column = start + min(c, columns - 1)
-            for k in range(n):
-                longer[pad + k, c] = signal[k, column]
-            for k in range(pad):
-                longer[k, c] = 2.0 * signal[0, column] - signal[pad - k, column]
-                longer[pad + n + k, c] = 2.0 * signal[n - 1, column] - signal[n - 2 - k, column]
-        _pass(section, longer, 0, 1)
-        _pass(section, longer, longer.shape[0] - 1, -1)
-        for c in range(columns):
-            for k in range(n):
-                filtered[k, start + c] = longer[pad + k, c]
+    size = longer.shape[0]
+    pad = (size - n) // 2
+    for c0 in range(0, signal.shape[1], 3):
+        last = signal.shape[1] - 1
+        c1, c2 = min(c0 + 1, last), min(c0 + 2, last)
+        x0, y0, z0 = signal[0, c0], signal[0, c1], signal[0, c2]
+        xn, yn, zn = signal[n - 1, c0], signal[n - 1, c1], signal[n - 1, c2]
+        state = _at_rest(
+            section,
+            2.0 * x0 - signal[pad, c0],
+            2.0 * y0 - signal[pad, c1],
+            2.0 * z0 - signal[pad, c2],
+        )
+        for k in range(pad):
+            (u, v, w), state = _next(
+                section,
+                2.0 * x0 - signal[pad - k, c0],
+                2.0 * y0 - signal[pad - k, c1],
+                2.0 * z0 - signal[pad - k, c2],
+                state,
+            )
+            longer[k, 0], longer[k, 1], longer[k, 2] = u, v, w
+        for k in range(n):
+            (u, v, w), state = _next(section, signal[k, c0], signal[k, c1], signal[k, c2], state)
+            row = pad + k
+            longer[row, 0], longer[row, 1], longer[row, 2] = u, v, w
+        for k in range(pad):
+            (u, v, w), state = _next(
+                section,
+                2.0 * xn - signal[n - 2 - k, c0],
+                2.0 * yn - signal[n - 2 - k, c1],
+                2.0 * zn - signal[n - 2 - k, c2],
+                state,
+            )
+            row = pad + n + k
+            longer[row, 0], longer[row, 1], longer[row, 2] = u, v, w
+        state = _at_rest(section, longer[size - 1, 0], longer[size - 1, 1], longer[size - 1, 2])
+        for k in range(size - 1, pad - 1, -1):
+            (u, v, w), state = _next(section, longer[k, 0], longer[k, 1], longer[k, 2], state)
+            if k < pad + n:
+                filtered[k - pad, c0], filtered[k - pad, c1], filtered[k - pad, c2] = u, v, w
 
 
 def filter_cfc(signal: ArrayLike, sampling_rate: float, frequency_class: float = 1000.0) -> Array:

@@ -75,3 +75,17 @@ def resultant(signal: Array) -> Array:
     out = np.empty(signal.shape[0])
     _resultant(signal, out)
     return out
+
+
+@unfused_kernel
+def _largest(signal, out):
+    for i in range(signal.shape[0]):
+        for k in range(signal.shape[1]):
+            out[k] = max(out[k], abs(signal[i, k]))
+
+
+def largest_magnitudes(signal: Array) -> Array:
+    """Return the largest magnitude (k,) of each column of a signal (n, k)."""
+    out = np.zeros(signal.shape[1])
+    _largest(signal, out)
+    return out

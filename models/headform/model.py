@@ -22,7 +22,7 @@ from models.contact.law import (
     stiffest_slope,
 )
 from models.criteria.units import STANDARD_GRAVITY
-from models.declaration import read_inputs, read_outputs, run_rows
+from models.declaration import read_channels, read_inputs, read_outputs, run_rows
 from models.effects.chain import build_chain
 from models.effects.reading import Reading, Record, record_reading
 from models.effects.registry import effects_of
@@ -115,6 +115,10 @@ class HeadformModel:
     name = "headform"
     effects: tuple[str, ...] = effects_of("headform")
     partial_status: frozenset[str] = frozenset()
+    channels = read_channels(_TABLE)
+    isomme_device = str(_TABLE["isomme_device"])
+    accidents = False
+    cost = float(_TABLE["cost"])
 
     def __init__(
         self,

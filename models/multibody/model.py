@@ -8,7 +8,7 @@ from models import data
 from models.crash import outcome
 from models.crash.model import FRAME_INTERVAL, TIME_LIMIT, CrashModel
 from models.crash.record import Summary
-from models.declaration import read_inputs, read_outputs
+from models.declaration import read_channels, read_inputs, read_outputs
 from models.effects.registry import effects_of
 from models.multibody.setup import Crash, build_crash
 from models.multibody.simulation import CoreModel, Settings, empty_data, simulate
@@ -32,6 +32,9 @@ class MultibodyModel(CrashModel):
     outputs = read_outputs(_TABLE)
     effects: tuple[str, ...] = effects_of("multibody")
     _own_inputs = read_inputs(_TABLE)
+    channels = read_channels(_TABLE)
+    isomme_device = str(_TABLE["isomme_device"])
+    cost = float(_TABLE["cost"])
 
     def _step(self, values: dict[str, float]) -> outcome.Raw | None:
         crash = build_crash(values, self.vehicle, self._chain)
@@ -73,6 +76,7 @@ class MultibodyModel(CrashModel):
         summary = data.summary
         return outcome.Raw(
             scenario=scenario,
+            classes=self.classes,
             chain=self._chain,
             values=values,
             record=record[: int(summary[Summary.RECORDS])],

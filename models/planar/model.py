@@ -11,7 +11,7 @@ from models.crash.model import FRAME_INTERVAL, TIME_LIMIT, CrashModel
 from models.crash.record import BLOW_ENTRIES, HEAD_CONTACT_ENTRIES, Summary
 from models.crash.scenario import build_scenario
 from models.crash.surfaces import CHANNELS, Contacts, empty_contacts
-from models.declaration import read_inputs, read_outputs
+from models.declaration import read_channels, read_inputs, read_outputs
 from models.effects.registry import effects_of
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
 from models.planar import stepping
@@ -52,6 +52,10 @@ class PlanarModel(CrashModel):
         for item in read_inputs(_SPATIAL)
     )
 
+    channels = read_channels(_SPATIAL)
+    isomme_device = ""
+    cost = float(_TABLE["cost"])
+
     def _step(self, values: dict[str, float]) -> outcome.Raw | None:
         scenario = build_scenario(values, self.vehicle, self._chain)
         n, zones = len(SEGMENTS), len(self.vehicle.zones)
@@ -90,6 +94,7 @@ class PlanarModel(CrashModel):
         simulate(STEP_SPACE, EACH_BODY, model, data)
         return outcome.Raw(
             scenario=replace(scenario, car_motion=car_motion, ellipsoids=ellipsoids),
+            classes=self.classes,
             chain=self._chain,
             values=values,
             record=self._record[: int(summary[Summary.RECORDS])],

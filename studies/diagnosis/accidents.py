@@ -67,8 +67,8 @@ class _Draws:
 
 
 def is_collection(data: Measured) -> bool:
-    """Return whether measured data are accidents: scalars only, of the crash core."""
-    return data.header.model == "multibody" and not data.header.signals
+    """Return whether measured data are accidents: scalars only, of a model of whole accidents."""
+    return load_model(data.header.model).accidents and not data.header.signals
 
 
 def build_collection(

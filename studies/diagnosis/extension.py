@@ -8,6 +8,7 @@ import numpy as np
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.measurement.measured_data import Measured
 from mcstudy.statistics import REACH
+from models.crash.outcome import ANGULAR_CLASS, LINEAR_CLASS
 from models.registry import load_model
 from studies.diagnosis.model_choice import ModelChoice
 from studies.injury.schema import InjuryStudy
@@ -37,7 +38,8 @@ def base_study(data: Measured, choice: ModelChoice, problem: Problem, name: str)
         "[model]",
         f'name = "{choice.name}"',
     ]
-    options = {k: v for k, v in choice.options.items() if k != "channel_class" or v != 1000.0}
+    usual = {"channel_class": LINEAR_CLASS, "angular_class": ANGULAR_CLASS}
+    options = {k: v for k, v in choice.options.items() if usual.get(k) != v}
     if options:
         lines.append(f"options = {_toml(options)}")
     lines += ["", "[design]", 'method = "latin-hypercube"', f"n = {RUNS}"]

@@ -73,9 +73,11 @@ def choose_model(data: Measured, file: Path | None) -> ModelChoice:
         if isinstance(value, list):
             options[name] = value
     signals = header.signals
-    if "head_acceleration" in signals and header.model == "headform":
-        options["channel_class"] = signals["head_acceleration"].channel_class
     try:
+        # The model filters as the laboratory did.
+        for name, channel in load_model(header.model, options, effects).channels.items():
+            if name in signals and channel.filter_option:
+                options[channel.filter_option] = signals[name].channel_class
         model = load_model(header.model, options, effects)
     except (ValueError, TypeError) as error:
         raise UserError(f"{file or place}: model: {error}") from None

@@ -17,9 +17,9 @@ from mcstudy.studyfile.distributions import Distribution
 from mcstudy.studyfile.input_space import InputSpace
 from models.criteria.filters import settling_time
 from models.criteria.units import STANDARD_GRAVITY
-from models.protocol import Model
+from models.protocol import Channel, Model
 from studies.diagnosis.model_choice import ModelChoice
-from studies.diagnosis.simulation import DERIVED, Simulation, channel_units
+from studies.diagnosis.simulation import Simulation, channel_units
 
 Array = NDArray[np.float64]
 
@@ -165,7 +165,11 @@ def _test(
     for channel, entry in noise.items():
         time, values = _thinned(*data.signal(name, channel, entry.unit))
         signals.append(Signal(channel, time, values, entry.sd, entry.correlation))
-    derived = {output for channel in header.signals for output in DERIVED.get(channel, ())}
+    derived = {
+        output
+        for channel in header.signals
+        for output in model.channels.get(channel, Channel()).outputs
+    }
     scalars, judged = [], []
     for scalar in _scalars(data, model, row):
         if scalar.name in derived:

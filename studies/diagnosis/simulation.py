@@ -1,27 +1,12 @@
 """Simulated tests: a model of the registry seen through the channels that were measured."""
 
-import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
 from mcstudy.diagnosis.problem import Observation
 from models.criteria.filters import filter_cfc
-from models.protocol import Model, complete_status
+from models.protocol import Channel, Model, complete_status
 from models.registry import load_model
-
-FILTERED = {"headform": {"head_acceleration": 0.0}, "multibody": {"head_acceleration": 1000.0}}
-"""Channels that a model filters itself, and by which class; 0 for the class that it is told."""
-DERIVED = {
-    "head_acceleration": (
-        "hic15",
-        "hic36",
-        "clip_3ms",
-        "clip_3ms_consecutive",
-        "peak_head_acceleration",
-    ),
-    "hood_force": ("peak_force",),
-}
-"""Outputs that follow from a measured channel: no evidence of their own."""
 
 
 def channel_units(model: Model, names: Collection[str]) -> dict[str, str]:
@@ -72,8 +57,9 @@ class Simulation:
 
         In a straight impact one axis is measured, with its sign: an offset may be negative.
         """
-        straight = self.name == "headform" and inputs.get("impact_angle", 0.0) == 0.0
-        return "head_acceleration_normal" if straight and name == "head_acceleration" else name
+        channel = self.model(()).channels.get(name, Channel())
+        straight = channel.straight and inputs.get("impact_angle", 0.0) == 0.0
+        return channel.straight if straight else name
 
     def widened(self, filters: Mapping[str, float], scalars: Collection[str]) -> "Simulation":
         """Return the simulation with more channels and scalars."""
@@ -102,8 +88,9 @@ class Simulation:
             group, _, channel = self._seen_as(name, run.inputs).partition("_")
             history = run.histories[group]
             signal = history.channels[channel]
-            # What a model has filtered by a high class goes on through a lower one.
-            if 0.0 < channel_class < FILTERED[self.name].get(name, math.inf):
+            # What the model filters has passed the measured class already.
+            filtered = model.channels.get(name, Channel()).filter_option
+            if channel_class > 0.0 and not filtered:
                 rate = 1.0 / float(history.time[1] - history.time[0])
                 signal = filter_cfc(signal, rate, channel_class)
             signals[name] = (history.time, signal)

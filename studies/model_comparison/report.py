@@ -146,10 +146,13 @@ def summarise(analysis: Mapping[str, Any]) -> list[Any]:
 
 def _scene(entry: Mapping[str, Any]) -> Scene:
     """Return the scene that a cell keeps."""
-    plain = {key: np.asarray(entry[key], dtype=float) for key in
-             ("time", "semi_axes", "centre", "orientation", "car", "plan")}  # fmt: skip
+    time, semi_axes, centre, orientation, car, plan = (
+        np.asarray(entry[key], dtype=float)
+        for key in ("time", "semi_axes", "centre", "orientation", "car", "plan")
+    )
     outline = [np.asarray(line, dtype=float) for line in entry["outline"]]
-    return Scene(names=list(entry["names"]), outline=outline, **plain)
+    names = list(entry["names"])
+    return Scene(time, names, semi_axes, centre, orientation, car, outline, plan)
 
 
 def _title(name: str) -> str:

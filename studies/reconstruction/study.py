@@ -143,7 +143,7 @@ def write_reconstruction(
         )
         folder.add_histories(0, run.histories)
         write_isomme(
-            run, model.name, folder.path / "iso_mme", name=study.name, title=study.title
+            run, model, folder.path / "iso_mme", name=study.name, title=study.title
         )  # fmt: skip
         figures = draw(study, run)
         style.save(figures, folder.path / "figures")

@@ -209,7 +209,7 @@ def test_left_and_right_are_mirror_images(name: str, y: float, depth: float, alo
     left, right = (car.centre(sign * y, depth, along) for sign in (1.0, -1.0))
     forces = car.press(car.contacts(), left)
     assert forces == pytest.approx(car.press(car.contacts(), right), rel=1e-12, abs=1e-9)
-    mirror = np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0])
+    mirror = np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
     for here, there in zip(car.sides(left), car.sides(right), strict=True):
         np.testing.assert_allclose(mirror * here, there, rtol=1e-12, atol=1e-12)
 

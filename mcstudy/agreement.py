@@ -159,7 +159,7 @@ def split_variance(values: Array, parts: Parts) -> VarianceSplit:
     return VarianceSplit(share(0), share(1), share(2), total)
 
 
-def breaking_inputs(
+def sources_of_disagreement(
     reference: Array, method: Array, inputs: Array, seed: int
 ) -> tuple[Array, float]:
     """Return what the rank correlation gains if an input's disagreement is taken out.

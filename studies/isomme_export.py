@@ -7,7 +7,7 @@ import numpy as np
 from mcstudy.measurement import isomme
 from models.protocol import Model, Run
 
-FEWEST = 8
+MIN_COUNT = 8
 """Samples that an impact with the road takes at least."""
 
 CAR, ROAD = "car", "road"
@@ -45,7 +45,7 @@ def write_isomme(run: Run, model: Model, folder: Path, *, name: str, title: str)
     if "ground_time" not in run.outputs:
         return [_write(run, model, folder / name, slice(0, None), name, title, "")]
     files = [_write(run, model, folder / name, slice(0, split), name, title, _PHASES[CAR])]
-    if time.size - split >= FEWEST:
+    if time.size - split >= MIN_COUNT:
         name = f"{name}_{ROAD}"
         files.append(
             _write(run, model, folder / name, slice(split, None), name, title, _PHASES[ROAD])

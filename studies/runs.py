@@ -19,7 +19,7 @@ from mcstudy.execution.failures import endings, locate_failures
 from mcstudy.execution.progress import Progress
 from mcstudy.execution.results import ResultsFolder, check_failures, digest, status_counts
 from mcstudy.execution.workers import Workers, parallel_backend
-from mcstudy.sensitivity.blocks import FEWEST_BLOCKS
+from mcstudy.sensitivity.blocks import MIN_BLOCKS
 from mcstudy.studyfile.identity import hash_of, numbers_digest
 from mcstudy.studyfile.schema import RUN_TIME, CommonStudy, SampledStudy
 from mcstudy.studyfile.study_outputs import report_outputs
@@ -201,7 +201,7 @@ def complete_blocks(folder: ResultsFolder, model: Model) -> pd.DataFrame:
     ids = runs["run"].to_numpy()
     gaps = np.flatnonzero(ids != np.arange(ids.size))
     blocks = (int(gaps[0]) if gaps.size else ids.size) // block
-    if blocks < FEWEST_BLOCKS:
+    if blocks < MIN_BLOCKS:
         raise UserError(f"{folder.path}: too few runs are done for a report; run the study again")
     held: pd.DataFrame = runs.iloc[: blocks * block]
     return held

@@ -19,8 +19,8 @@ from mcstudy.measurement.measured_data import Measured, load_measured
 from mcstudy.report import Section, Table, render
 from mcstudy.text import interval, number
 from models.contact.corridor import (
-    FEWEST_CURVES,
     METHODS,
+    MIN_CURVES,
     Corridor,
     build_corridor,
     corridor_text,
@@ -202,7 +202,7 @@ def fit_stiffness_of(
     data = keep_first_impacts(load_measured(folder, channels))
     tests = fit_tests(data, knots=knots, quiet=quiet)
     corridor = None
-    if len(tests) >= FEWEST_CURVES:
+    if len(tests) >= MIN_CURVES:
         corridor = build_corridor([test.fit.curve for test in tests], method)
     with out.open_for_writing():
         analysis = _analysis(data, tests, corridor, method)
@@ -404,7 +404,7 @@ def _report(
             )
         )  # fmt: skip
     else:
-        sections.append(Section("Corridor", (f"A corridor takes {FEWEST_CURVES} tests or more.",)))
+        sections.append(Section("Corridor", (f"A corridor takes {MIN_CURVES} tests or more.",)))
     if analysis["notes"]:
         sections.append(Section("What was read", analysis["notes"]))
     subtitle = f"Stiffness from {len(tests)} headform tests in {data.source}"

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from mcstudy.diagnosis.layout import Layout, Scatter
 from mcstudy.diagnosis.normal_equations import NormalEquations, Scores
 from mcstudy.diagnosis.problem import Form, Observation, Problem
-from mcstudy.studyfile.input_space import FARTHEST, value_at
+from mcstudy.studyfile.input_space import MAX_SCORE, value_at
 
 Array = NDArray[np.float64]
 
 SHARED_STEP, OWN_STEP = 0.1, 0.5
 """Scores by which shared and a test's own values are moved for a slope."""
-MOST_STEPS = 12
+MAX_STEPS = 12
 CONVERGED = 0.05
 """Expected gain in log units below which a fit is done."""
 LINEAR = 0.7
@@ -137,7 +137,7 @@ def fit(
     *,
     exact: bool = True,
     weight: float = 1.0,
-    most: int = MOST_STEPS,
+    most: int = MAX_STEPS,
 ) -> Fit:
     """Return the most probable fit near a start.
 
@@ -383,7 +383,7 @@ def _descend(
     share = min(1.0, LONGEST / longest) if longest > 0.0 else 1.0
     for _ in range(6):
         trial = Scores(
-            np.clip(scores.shared + share * move.shared, -FARTHEST, FARTHEST),
+            np.clip(scores.shared + share * move.shared, -MAX_SCORE, MAX_SCORE),
             tuple(z + share * d for z, d in zip(scores.own, move.own, strict=True)),
         )
         seen = observe_tests(problem, forms, layouts, trial)

@@ -8,7 +8,7 @@ from scipy import stats
 
 Array = NDArray[np.float64]
 
-FEWEST = 40
+MIN_COUNT = 40
 """Samples before contact from which noise is estimated."""
 LEVEL = 1e-3
 """Probability below which the stated noise is not believed."""
@@ -42,12 +42,12 @@ def estimate_noise(lead_ins: list[Array], stated: float) -> Noise:
     """
     parts = [part - part.mean() for part in lead_ins if part.size >= 4]
     count = sum(part.size - 1 for part in parts)
-    if count < FEWEST:
+    if count < MIN_COUNT:
         if stated > 0.0:
             return Noise(stated, 0.0, False)
         raise ValueError(
             f"sd is 0 and only {count} samples lie before contact, too few to estimate the noise "
-            f"({FEWEST} needed); state sd"
+            f"({MIN_COUNT} needed); state sd"
         )
     products = sum(float(part[1:] @ part[:-1]) for part in parts)
     square = sum(float(part @ part) for part in parts)

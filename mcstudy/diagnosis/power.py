@@ -48,7 +48,7 @@ class Visible:
     none: float
 
 
-def smallest_visible(
+def minimum_detectable_effects(
     problem: Problem,
     layouts: Sequence[Layout],
     fitted: Fit,
@@ -149,7 +149,7 @@ class Worth:
     visibility: float
 
 
-def worth_of(
+def value_of_information(
     problem: Problem,
     layouts: Sequence[Layout],
     best: Fit,

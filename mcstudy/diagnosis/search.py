@@ -7,11 +7,11 @@ import numpy as np
 
 from mcstudy.diagnosis.fit import Fit, fit, shared_names, start_scores
 from mcstudy.diagnosis.layout import Layout, lay_out
-from mcstudy.diagnosis.naming import (
+from mcstudy.diagnosis.model_selection import (
     DISTINCT,
-    MOST_OF_IT,
+    MAX_SHARE,
+    SCAN,
     STRUCTURE,
-    SURVEY,
     Candidate,
     Remainder,
     examine,
@@ -49,7 +49,7 @@ NEARLY_ALL = 0.99
 """Share of the misfit that two causes which leave structure must explain together."""
 FURTHER = 4.5
 """Standard errors from which a cause's template, after the first cause, is a second one's trace."""
-MOST_SECONDS = 2
+MAX_SECONDS = 2
 """Second causes that may be alike: what more of them explain equally well is nobody's trace."""
 RIVAL = 0.5
 """Share of the best cause's evidence from which another one is tried as the first of two."""
@@ -118,7 +118,7 @@ def fit_base(problem: Problem) -> tuple[tuple[Layout, ...], Fit]:
         if seen is None:
             raise UserError(f"test {test.name!r}: the model fails at its recorded inputs")
         layouts.append(lay_out(test, seen))
-    found = fit(problem, layouts, (), start_scores(layouts, len(problem.unknowns)), SURVEY)
+    found = fit(problem, layouts, (), start_scores(layouts, len(problem.unknowns)), SCAN)
     for _ in range(2):
         scatter = estimate_scatter(found, layouts, smooth_discrepancy(layouts, found))
         found = fit(problem, layouts, (), rescale(layouts, found, scatter), scatter)
@@ -220,7 +220,7 @@ def _judge(
         )
     if clean:
         return alone
-    if left.share >= MOST_OF_IT:
+    if left.share >= MAX_SHARE:
         return flagged
     return replace(nothing, remainder=left, why="the best cause leaves structure behind")
 
@@ -286,7 +286,7 @@ def _best_pair(
     if not pairs:
         return None
     best = max(pairs, key=lambda pair: pair.log_evidence)
-    if len(_near(best.seconds)) > MOST_SECONDS:
+    if len(_near(best.seconds)) > MAX_SECONDS:
         return None
     left = examine(problem, empty.layouts, empty.base, best.seconds[0].fitted)
     added, sole = best.seconds[0].log_evidence, best.first.log_evidence

@@ -17,7 +17,7 @@ SMOOTH = 7
 """Cosines over the pulse of a smooth discrepancy."""
 HIGHEST = 1500.0
 """Hz up to which a discrepancy that all tests share is looked for (below CFC 1000's corner)."""
-MOST_FINE = 48
+MAX_FINE = 48
 """Cosines beyond the smooth ones, at most."""
 SIZE = 0.05
 """A discrepancy's unit, over the peak of the signal or the scalar."""
@@ -154,7 +154,7 @@ def smooth_discrepancy(layouts: Sequence[Layout], fitted: Fit) -> Shapes:
 def fine_discrepancy(layouts: Sequence[Layout], fitted: Fit) -> Shapes:
     """Return the finer cosines, the same in all tests."""
     length = max(layout.window[1] - layout.window[0] for layout in layouts)
-    last = min(SMOOTH + MOST_FINE, int(2.0 * length * HIGHEST))
+    last = min(SMOOTH + MAX_FINE, int(2.0 * length * HIGHEST))
     factors = {"all tests": np.ones(len(layouts))}
     return _discrepancy(layouts, fitted, range(SMOOTH, last), factors, shaped=False)
 

@@ -15,7 +15,7 @@ Item = TypeVar("Item")
 
 REACH = 1.96
 """Standard errors of a 95 % interval."""
-FEWEST = 10
+MIN_COUNT = 10
 """Values below which nothing is said of a mean."""
 
 
@@ -72,7 +72,7 @@ class _RunningMean:
     @property
     def relative_reach(self) -> float:
         """Half the 95 % interval of the mean over the mean; NaN for fewer than ten values."""
-        if self.count < FEWEST or self.mean == 0.0:
+        if self.count < MIN_COUNT or self.mean == 0.0:
             return math.nan
         error = math.sqrt(self.square / (self.count - 1) / self.count)
         return abs(REACH * error / self.mean)

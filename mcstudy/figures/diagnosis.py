@@ -14,7 +14,7 @@ COLOURS = {"base": style.BLUE, "extended": style.RED}
 NAMES = {"base": "model as it stands", "extended": "extended model"}
 LARGEST = 10.0
 """Standard errors at which the colours of a map end."""
-FEWEST = 1e-3
+MIN_COUNT = 1e-3
 
 
 def draw_pulses(curves: Sequence[Mapping[str, Any]], label: str) -> Figure:
@@ -118,7 +118,7 @@ def draw_evidence(effects: Sequence[Mapping[str, Any]]) -> Figure:
 
 def draw_gain(gains: Sequence[Mapping[str, Any]], labels: Mapping[str, str]) -> Figure:
     """Return by how much predictions of held-out tests are better, in per cent of the base."""
-    shown = [g for g in gains if g["score"] in labels and abs(g["base"]) > FEWEST]
+    shown = [g for g in gains if g["score"] in labels and abs(g["base"]) > MIN_COUNT]
     regions = list(dict.fromkeys(g["region"] for g in shown))
     with style.styled():
         figure = style.new_figure(8.5, 0.42 * max(len(shown), 3) + 1.2)

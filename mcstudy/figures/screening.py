@@ -62,9 +62,9 @@ def draw_elementary_effects(outputs: Mapping[str, Mapping[str, Any]]) -> Figure:
         figure = style.new_figure(4.3 * len(outputs), 3.9)
         row = figure.subplots(1, len(outputs), squeeze=False)[0]
         for axes, (name, entry) in zip(row, outputs.items(), strict=True):
-            table = {k: v for k, v in entry["factors"].items() if v["spread"] is not None}
+            table = {k: v for k, v in entry["factors"].items() if v["sigma"] is not None}
             order = sorted(table, key=lambda key: -table[key]["value"])
-            size, spread = (column(table, order, key) for key in ("value", "spread"))
+            size, spread = (column(table, order, key) for key in ("value", "sigma"))
             top = 1.08 * float(max(size.max(), spread.max(), 1e-300))
             for slope, dash in ((0.1, ":"), (0.5, "--"), (1.0, "-")):
                 axes.plot([0.0, top], [0.0, slope * top], color=style.GREY, linestyle=dash,

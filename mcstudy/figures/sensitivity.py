@@ -162,7 +162,7 @@ def draw_main_effects(effects: Mapping[str, Mapping[str, Any]], ylabel: str) -> 
         return figure
 
 
-MOST_LINES = 7
+MAX_LINES = 7
 """Factors that the convergence figure follows, the largest."""
 
 
@@ -173,7 +173,7 @@ def draw_convergence(convergence: Mapping[str, Sequence[Mapping[str, Any]]]) -> 
         row = figure.subplots(1, len(convergence), squeeze=False)[0]
         for axes, (name, steps) in zip(row, convergence.items(), strict=True):
             last = steps[-1]["total"]
-            order = sorted(last, key=lambda k: -(last[k]["value"] or 0.0))[:MOST_LINES]
+            order = sorted(last, key=lambda k: -(last[k]["value"] or 0.0))[:MAX_LINES]
             n = np.array([step["n"] for step in steps], dtype=float)
             for k, factor in enumerate(order):
                 value, low, high = (

@@ -46,13 +46,13 @@ class FittedLoop:
 
 ENTRY = 1.75
 """Inches that an entry of a legend takes."""
-MOST_PANELS = 12
+MAX_PANELS = 12
 """Tests that get a panel of their own."""
 
 
 def _panels(count: int, width: float, height: float) -> tuple[Figure, list[Axes]]:
     """Return a figure with a panel for each of ``count`` tests, up to twelve."""
-    shown = min(count, MOST_PANELS)
+    shown = min(count, MAX_PANELS)
     columns = min(3, shown)
     rows = -(-shown // columns)
     figure = style.new_figure(width * columns, height * rows)

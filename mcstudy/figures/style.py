@@ -58,7 +58,7 @@ LABELS = {
 }
 LINE, TICK, LINES = 44, 28, 3
 """Characters of a line of a label and of a tick's, and lines after which one is cut."""
-FARTHEST = 1e4
+MAX_SCORE = 1e4
 """Times the size of what is drawn that a reference may be away to be drawn with it (assumed)."""
 _NO_WIDTH = "\N{ZERO WIDTH SPACE}"
 _UNIT_TEXT = {"1": "", "m/s2": "m/s²", "rad/s2": "rad/s²"}
@@ -141,7 +141,7 @@ def ends_of(
 
 def is_near(values: ArrayLike, point: float) -> bool:
     """Tell whether a point can be drawn on one axis with values without hiding them."""
-    return abs(point) <= FARTHEST * (float(np.abs(np.asarray(values)).max()) or 1.0)
+    return abs(point) <= MAX_SCORE * (float(np.abs(np.asarray(values)).max()) or 1.0)
 
 
 def covered(axes: Axes, height: float) -> float:

@@ -19,7 +19,7 @@ from mcstudy.statistics import REACH
 Array = NDArray[np.float64]
 
 GRID = 200
-MOST_REFITTED = 300
+MAX_REFITTED = 300
 """Cases up to which each is left out once to see what it does."""
 INFLUENCE_SHOWN = 5
 INFLUENTIAL = 1.0
@@ -99,7 +99,7 @@ def _influence(observations: Observations, fit: RiskFit) -> dict[str, Any] | Non
     The shift is that of the stimulus at 5, 25 or 50 % risk, whichever moves most, in standard
     errors of the curve without the case.
     """
-    if observations.size > MOST_REFITTED:
+    if observations.size > MAX_REFITTED:
         return None
     before = np.array([fit.log_stimulus_at(p)[0] for p in QUALITY_AT])
     shifts = np.full(observations.size, np.inf)

@@ -16,7 +16,7 @@ from mcstudy.injury.observations import Observations
 
 Array = NDArray[np.float64]
 
-MOST_STEPS = 2_000
+MAX_STEPS = 2_000
 TOLERANCE = 1e-9
 """Largest change of a share in a step at which it has settled."""
 
@@ -61,7 +61,7 @@ def estimate_steps(observations: Observations) -> StepRisk:
     inside[exact] = point & (left == high[exact][:, None])
     weight = observations.weights / observations.weights.sum()
     share = np.full(left.size, 1.0 / left.size)
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         once = _redistribute(inside, weight, share)
         twice = _redistribute(inside, weight, once)
         if float(np.max(np.abs(twice - once))) < TOLERANCE:

@@ -37,7 +37,7 @@ FORMAT = "mcstudy-measured/1"
 HEADER = "measured.toml"
 
 EMPTY = "leave a field empty where nothing was measured"
-FEWEST_SAMPLES = 8
+MIN_SAMPLES = 8
 """Samples below which a signal cannot be used."""
 FINEST, COARSEST = 1e-8, 1.0
 """s between samples that a recorder of a crash can have (assumed)."""
@@ -231,10 +231,10 @@ def _series(path: Path, frame: pd.DataFrame, name: str) -> Array:
     table: Array = frame[["time", name]].to_numpy(dtype=float)
     given = np.flatnonzero(np.isfinite(table).all(axis=1))
     table = table[given]
-    if len(table) < FEWEST_SAMPLES:
+    if len(table) < MIN_SAMPLES:
         raise UserError(
             f"{path}: line {frame.index[-1] if len(frame) else 1}: column {name!r} ends after "
-            f"{len(table)} samples, {FEWEST_SAMPLES} are needed"
+            f"{len(table)} samples, {MIN_SAMPLES} are needed"
         )
     back = np.diff(table[:, 0]) <= 0.0
     if back.any():
@@ -291,9 +291,9 @@ def _from_isomme(folder: Path, tests: Sequence[isomme.Test], channels: Sequence[
                 f"{found.object}' must be given"
             )
         channel = found.channel
-        if channel.time.size < FEWEST_SAMPLES:
+        if channel.time.size < MIN_SAMPLES:
             raise UserError(
-                f"{test.path}: {channel.code} holds {channel.time.size} samples, {FEWEST_SAMPLES} "
+                f"{test.path}: {channel.code} holds {channel.time.size} samples, {MIN_SAMPLES} "
                 "are needed"
             )
         _check_samples(f"{test.path}: {channel.code}", channel.time, channel.values)

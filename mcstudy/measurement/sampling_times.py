@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-MOST_DIGITS = 12
+MAX_DIGITS = 12
 """Decimals of a second up to which printed digits are sought."""
 EXACT = 1e-9
 """Share of a step within which times are uniform as they are."""
@@ -42,7 +42,7 @@ def regular_times(time: Array) -> Array:
 
 def _printed_unit(time: Array) -> float:
     """Return the unit (s) of the last digit that times are printed with, 0 if they have many."""
-    for digits in range(MOST_DIGITS + 1):
+    for digits in range(MAX_DIGITS + 1):
         counted = time * 10.0**digits
         if np.all(np.abs(counted - np.round(counted)) <= 1e-12 * np.abs(counted) + 1e-6):
             return float(10.0**-digits)

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 DUMMY = "dummy"
 """Name of the factor that stands for no input."""
-NUDGE = 1e-4
+PERTURBATION = 1e-4
 """By how much of its range in probability the dummy moves an input (assumed)."""
 _TURN = 0.6180339887498949
 """Share of a turn between the nudges of two inputs (golden ratio: no two go together)."""
@@ -38,10 +38,10 @@ def salib_problem(
     }
 
 
-def nudged(uniforms: Array, dummy: Array) -> Array:
+def perturbed(uniforms: Array, dummy: Array) -> Array:
     """Return the (n, d) uniforms moved by the (n,) dummy, reflected at the borders of the cube."""
     turns = dummy[:, None] + _TURN * np.arange(uniforms.shape[1])
-    moved = np.abs(uniforms + NUDGE * np.sin(2.0 * np.pi * turns))
+    moved = np.abs(uniforms + PERTURBATION * np.sin(2.0 * np.pi * turns))
     return np.asarray(1.0 - np.abs(1.0 - moved))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcstudy.sampling import seeds
-from mcstudy.sampling.factors import factors_of, nudged, salib_problem
+from mcstudy.sampling.factors import factors_of, perturbed, salib_problem
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ def draw_trajectories(
     )
     factors = factors_of(inputs, groups)
     block = len(factors) + 1
-    uniforms = nudged(TAIL + (1.0 - 2.0 * TAIL) * rows[:, :-1], rows[:, -1])
+    uniforms = perturbed(TAIL + (1.0 - 2.0 * TAIL) * rows[:, :-1], rows[:, -1])
     return Trajectories(uniforms, rows, factors, block, np.arange(n * block) // block)
 
 

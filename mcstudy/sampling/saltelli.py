@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcstudy.sampling import seeds
-from mcstudy.sampling.factors import factors_of, nudged, salib_problem
+from mcstudy.sampling.factors import factors_of, perturbed, salib_problem
 
 Array = NDArray[np.float64]
 
@@ -87,4 +87,4 @@ def draw_saltelli(
             cube[:, k] = rows.reshape(-1, block, len(inputs) + 1)
     rows = cube.reshape(n * block, -1)
     scramble = np.arange(n * block) // block % SCRAMBLES
-    return Saltelli(nudged(rows[:, :-1], rows[:, -1]), factors, block, scramble)
+    return Saltelli(perturbed(rows[:, :-1], rows[:, -1]), factors, block, scramble)

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-MOST_DROPPED = 0.2
+MAX_DROPPED = 0.2
 """Share of blocks that an output may lose before it gets no index (assumed)."""
-FEWEST_BLOCKS = 8
+MIN_BLOCKS = 8
 """Blocks below which no index is given (assumed)."""
 
 
@@ -38,7 +38,7 @@ def whole_blocks(outputs: Array, complete: Flags, block: int) -> tuple[Array, Fl
 
 def is_enough(kept: Flags) -> bool:
     """Tell whether so many of an output's (n,) blocks are kept that it gets an index."""
-    return int(kept.sum()) >= max(FEWEST_BLOCKS, (1.0 - MOST_DROPPED) * kept.size)
+    return int(kept.sum()) >= max(MIN_BLOCKS, (1.0 - MAX_DROPPED) * kept.size)
 
 
 def outputs_alike(kept: Flags) -> Iterator[tuple[Flags, NDArray[np.intp]]]:

@@ -26,7 +26,7 @@ RESAMPLES = 30
 """Bootstrap resamples of bias and scatter (assumed)."""
 GRID = 100
 """Points at which densities are compared (Plischke et al.)."""
-MOST_CLASSES = 48
+MAX_CLASSES = 48
 
 
 def delta(values: Array, outputs: Array, rng: np.random.Generator) -> Array:
@@ -81,7 +81,7 @@ def density_shift(values: Array, outputs: Array) -> Array:
 def _classes(n: int) -> int:
     """Return the number of classes (Plischke et al., as SALib)."""
     exponent = 2.0 / (7.0 + np.tanh((1500.0 - n) / 500.0))
-    return min(int(np.ceil(n**exponent)), MOST_CLASSES)
+    return min(int(np.ceil(n**exponent)), MAX_CLASSES)
 
 
 def _density(sample: Array, grid: Array) -> Array:

@@ -19,7 +19,7 @@ from mcstudy.statistics import varies
 
 Array = NDArray[np.float64]
 
-FEWEST_RUNS = 100
+MIN_RUNS = 100
 """Runs with a value below which the measures say nothing (assumed)."""
 DUMMIES = 20
 """Dummies whose largest value draws the noise line: one input in twenty passes it by chance."""
@@ -63,8 +63,8 @@ def measure_given_data(values: Array, outputs: Array, seed: int) -> GivenData:
     """
     held = np.isfinite(outputs)
     y = outputs[held]
-    if y.size < FEWEST_RUNS:
-        raise ValueError(f"{y.size} runs have a value, {FEWEST_RUNS} are needed")
+    if y.size < MIN_RUNS:
+        raise ValueError(f"{y.size} runs have a value, {MIN_RUNS} are needed")
     rng = seeds.generator(seed, seeds.GIVEN_DATA)
     x = np.column_stack([values[held], rng.random((y.size, DUMMIES))])
     d = values.shape[1]

@@ -25,13 +25,13 @@ class ElementaryEffects:
 
     Attributes
     ----------
-    mean : (d,), NaN for a group. mean_size : (3, d) mu* with low and high.
-    spread : (d,) sigma, NaN for a group. trajectories : used.
+    mean : (d,), NaN for a group. mu_star : (3, d) mu* with low and high.
+    sigma : (d,) sigma, NaN for a group. trajectories : used.
     """
 
     mean: Array
-    mean_size: Array
-    spread: Array
+    mu_star: Array
+    sigma: Array
     trajectories: int
 
 

@@ -17,7 +17,7 @@ from mcstudy import units as unit_conversion
 
 Array = NDArray[np.float64]
 
-FARTHEST = 8.0
+MAX_SCORE = 8.0
 """Normal score beyond which a quantile is not followed."""
 
 
@@ -108,7 +108,7 @@ class InputSpace:
         scores : (n, d) array
             Columns in the order of ``names``; beyond +-8 they are held.
         """
-        held = np.clip(scores, -FARTHEST, FARTHEST)
+        held = np.clip(scores, -MAX_SCORE, MAX_SCORE)
         if self._tied.any():
             held = held @ self._factor.T
         return self._values(list(special.ndtr(held).T))

@@ -17,14 +17,14 @@ from scipy import special
 
 from models import data
 from models.contact.law import ForceCurve
-from models.contact.loading import MOST_KNOTS, choose_knots, fit_loading
+from models.contact.loading import MAX_KNOTS, choose_knots, fit_loading
 
 Array = NDArray[np.float64]
 
 
 LEVEL = 0.9
 """Share of curves between the bounds of a corridor built from tests."""
-FEWEST_CURVES = 3
+MIN_CURVES = 3
 METHODS = ("quantiles", "components")
 
 
@@ -39,9 +39,9 @@ class Corridor:
     def __post_init__(self) -> None:
         for name, bound in (("lower", self.lower), ("upper", self.upper)):
             count = np.union1d(self.median.penetration, bound.penetration).size
-            if count > MOST_KNOTS:
+            if count > MAX_KNOTS:
                 raise ValueError(
-                    f"median and {name} have {count} different knots, {MOST_KNOTS} are possible"
+                    f"median and {name} have {count} different knots, {MAX_KNOTS} are possible"
                 )
         depth = np.concatenate([c.penetration for c in (self.lower, self.median, self.upper)])
         lower, median, upper = (c.at(depth) for c in (self.lower, self.median, self.upper))
@@ -167,8 +167,8 @@ def build_corridor(curves: Sequence[ForceCurve], method: str = "quantiles") -> C
     """
     if method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, given {method!r}")
-    if len(curves) < FEWEST_CURVES:
-        raise ValueError(f"a corridor takes {FEWEST_CURVES} or more curves, given {len(curves)}")
+    if len(curves) < MIN_CURVES:
+        raise ValueError(f"a corridor takes {MIN_CURVES} or more curves, given {len(curves)}")
     end = float(np.median([curve.penetration[-1] for curve in curves]))
     grid = np.linspace(0.0, end, 201)[1:]
     forces = np.array([curve.at(grid) for curve in curves])
@@ -187,7 +187,7 @@ def build_corridor(curves: Sequence[ForceCurve], method: str = "quantiles") -> C
         bounds = np.sort(bounds, axis=0)
     depth = np.concatenate([[0.0], grid])
     forces = np.pad(bounds, ((0, 0), (1, 0)))
-    knots = choose_knots(depth, forces[1], MOST_KNOTS)
+    knots = choose_knots(depth, forces[1], MAX_KNOTS)
     ratio = float(np.median([curve.unloading_ratio for curve in curves]))
     # Least squares may leave bounds crossed by a hair.
     fitted = np.sort([fit_loading(depth, f, knots) for f in forces], axis=0)

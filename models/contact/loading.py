@@ -6,7 +6,7 @@ from scipy.optimize import nnls
 
 Array = NDArray[np.float64]
 
-MOST_KNOTS = 8
+MAX_KNOTS = 8
 """Knots that a loading curve may have."""
 SPACING = 0.08
 """Least distance of knots over the largest penetration (assumed)."""
@@ -51,8 +51,8 @@ def choose_knots(
     ValueError
         If ``most`` is not within 2 to 8.
     """
-    if not 2 <= most <= MOST_KNOTS:
-        raise ValueError(f"a loading curve has 2 to {MOST_KNOTS} knots, given {most}")
+    if not 2 <= most <= MAX_KNOTS:
+        raise ValueError(f"a loading curve has 2 to {MAX_KNOTS} knots, given {most}")
     n = max(float(independent_samples or depth.size), 4.0)
     end = float(depth.max())
     grid = end * np.arange(SPACING, 1.0 - 0.5 * SPACING, 0.5 * SPACING)

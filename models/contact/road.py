@@ -13,13 +13,13 @@ class Road(NamedTuple):
     ----------
     friction : against the body. wet_from : m along the car's travel from first contact, beyond
         which it is ``wet_friction``.
-    pull, weight : m/s2, gravity along the car's travel and into the road.
+    gravity_along, gravity_down : m/s2, gravity along the car's travel and into the road.
     returned : factor on the share of the energy that the body gets back from the road.
     """
 
     friction: float
     wet_from: float = math.inf
     wet_friction: float = 0.0
-    pull: float = 0.0
-    weight: float = STANDARD_GRAVITY
+    gravity_along: float = 0.0
+    gravity_down: float = STANDARD_GRAVITY
     returned: float = 1.0

@@ -96,7 +96,7 @@ def build_scenario(
                 inputs["friction_tyre_road"],
                 inputs["yaw_rate"],
                 vehicle.rotation_centre,
-                road.pull,
+                road.gravity_along,
             ),
             given,
         ),

@@ -11,5 +11,6 @@ def apply(road: Road, parameters: Mapping[str, float]) -> Road:
     """Return the road with the effect."""
     angle = parameters["angle"]
     return road._replace(
-        pull=STANDARD_GRAVITY * math.sin(angle), weight=STANDARD_GRAVITY * math.cos(angle)
+        gravity_along=STANDARD_GRAVITY * math.sin(angle),
+        gravity_down=STANDARD_GRAVITY * math.cos(angle),
     )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from models.contact.law import KNOTS, ForceCurve, law_of
-from models.contact.loading import MOST_KNOTS, SPACING
+from models.contact.loading import MAX_KNOTS, SPACING
 from models.criteria.filters import CUTOFF_FACTOR, filter_cfc, settling_time
 from models.criteria.units import STANDARD_GRAVITY
 from models.headform.impact import (
@@ -41,7 +41,7 @@ FINEST = 1e-4
 """Change of a parameter from which its derivative is taken; all are logarithms or milliseconds."""
 FLATTEST, STEEPEST = 1e2, 1e8
 """N/m that a slope may have."""
-LEAST_RATIO, MOST_RATIO = 1.001, 1e3
+LEAST_RATIO, MAX_RATIO = 1.001, 1e3
 """Of the unloading line, as for signals that are integrated."""
 
 
@@ -104,7 +104,7 @@ def fit_through_filter(
     best = _search(signal, first)
     count = _independent(signal)
     score = _score(signal, best, count)
-    while _segments(best) < min(knots, MOST_KNOTS) - 1:
+    while _segments(best) < min(knots, MAX_KNOTS) - 1:
         trials = [_search(signal, trial) for trial in _with_a_knot(signal, best)]
         if not trials:
             break
@@ -146,13 +146,13 @@ def _curve_of(parameters: Array) -> ForceCurve:
     slopes = np.exp(np.clip(parameters[2 : 2 + count], math.log(FLATTEST), math.log(STEEPEST)))
     widths = np.append(np.exp(np.clip(parameters[2 + count :], -12.0, 2.0)), 1.0)
     ratio = 1.0 + math.exp(min(max(parameters[1], math.log(LEAST_RATIO - 1.0)),
-                               math.log(MOST_RATIO - 1.0)))  # fmt: skip
+                               math.log(MAX_RATIO - 1.0)))  # fmt: skip
     places = np.concatenate([[0.0], np.cumsum(widths)])
     return ForceCurve(places, np.concatenate([[0.0], np.cumsum(slopes * widths)]), ratio)
 
 
 def _log_ratio(ratio: float) -> float:
-    return math.log(min(max(ratio, LEAST_RATIO), MOST_RATIO) - 1.0)
+    return math.log(min(max(ratio, LEAST_RATIO), MAX_RATIO) - 1.0)
 
 
 def _simulate(signal: _Signal, parameters: Array) -> tuple[Array, Array, float] | None:

@@ -16,7 +16,7 @@ from models.contact.loading import choose_knots, fit_loading, refine_knots
 from models.criteria.filters import CUTOFF_FACTOR, filter_cfc, settling_time
 from models.criteria.units import STANDARD_GRAVITY
 from models.headform.filtered_fit import FilteredFit, fit_through_filter, repeat_fit
-from models.headform.loop import FEWEST_QUIET, QUIET, UNLOADED, Loop, force_penetration, integrate
+from models.headform.loop import MIN_QUIET, QUIET, UNLOADED, Loop, force_penetration, integrate
 
 Array = NDArray[np.float64]
 
@@ -203,7 +203,7 @@ def _through_filter(
     """Return the law whose simulated and filtered signal is the measured one, from one near it."""
     settling = settling_time(channel_class)
     quiet = a[t < near.loop.onset - max(QUIET, settling)]
-    offset = float(quiet.mean()) if quiet.size >= FEWEST_QUIET else near.loop.offset
+    offset = float(quiet.mean()) if quiet.size >= MIN_QUIET else near.loop.offset
     begin, end = near.loop.onset - settling, near.loop.onset + near.loop.time[-1] + settling
     inside = (t >= begin) & (t <= end)
     signal = (t[inside], a[inside] - offset, speed, mass, channel_class)

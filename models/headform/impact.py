@@ -17,7 +17,7 @@ NORMAL, TANGENTIAL, PENETRATION, RATE, SLIDE, SPIN = range(6)
 COLUMNS = 6
 
 # Entries of the summary.
-SAMPLES, DEEPEST, END_TIME, REBOUND, END_SLIDE, END_SPIN, SPENT = range(7)
+SAMPLES, DEEPEST, END_TIME, REBOUND, END_SLIDE, END_SPIN, ABSORBED = range(7)
 SUMMARY = 7
 
 
@@ -119,4 +119,4 @@ def strike(impactor, surface, laws, count, rate, slide, step, stride, record, su
     summary[REBOUND] = -rate
     summary[END_SLIDE] = slide
     summary[END_SPIN] = spin
-    summary[SPENT] = spent
+    summary[ABSORBED] = spent

@@ -27,7 +27,7 @@ LEAST_RISE = 0.02
 """Share of the peak that a signal has risen by at least: less is the filter's tail (assumed)."""
 QUIET = 0.002
 """s before the flank from which on a sample no longer counts as before contact (assumed)."""
-FEWEST_QUIET = 10
+MIN_QUIET = 10
 """Samples before contact that offset and noise take at least."""
 UNLOADED = 0.05
 """Share of the force at the largest penetration below which unloading is not fitted: contact ends
@@ -98,7 +98,7 @@ def force_penetration(
     for share in (FAR, NEAR):
         start = _crossing(t, a - offset, peak, share)
         quiet = a[t < start - lead]
-        if quiet.size >= FEWEST_QUIET:
+        if quiet.size >= MIN_QUIET:
             offset, noise = float(quiet.mean()), float(quiet.std(ddof=1))
     a = a - offset
     if not a[peak] > 0.0:

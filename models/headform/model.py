@@ -60,7 +60,7 @@ PHASE = 0.05
 """Largest step times the highest natural frequency of the contact (1 is a radian)."""
 DAMPING_WEIGHT = 25.0
 """How much finer a damping rate is stepped than a frequency: its force starts with a jump."""
-MOST_STEPS = 4000
+MAX_STEPS = 4000
 """Steps a sample, at most."""
 
 ELASTIC = 1.000001
@@ -284,7 +284,7 @@ class HeadformModel:
         stiffest = stiffest_slope(curve.penetration, curve.force, curve.unloading_ratio)
         frequency = math.sqrt(stiffest / mass) + DAMPING_WEIGHT * contact.damping / mass
         stride = math.ceil(frequency / (PHASE * SAMPLING_RATE))
-        stride = min(max(stride, FINEST), MOST_STEPS)
+        stride = min(max(stride, FINEST), MAX_STEPS)
         speed, angle = values["impact_speed"], values["impact_angle"]
         speeds = (speed * math.cos(angle), speed * math.sin(angle))
         record = np.empty((round(LONGEST_CONTACT * SAMPLING_RATE), COLUMNS))

@@ -10,6 +10,7 @@ from models.criteria import clip_level, head_injury_criterion
 from models.criteria.filters import settling_time
 from models.effects.reading import Record, retime
 from models.headform.impact import (
+    ABSORBED,
     END_SLIDE,
     END_SPIN,
     END_TIME,
@@ -18,7 +19,6 @@ from models.headform.impact import (
     RATE,
     REBOUND,
     SLIDE,
-    SPENT,
     SPIN,
     Impactor,
 )
@@ -74,7 +74,7 @@ def measures(test: Test) -> dict[str, Callable[[], float]]:
         "rebound_speed": lambda: float(summary[REBOUND]),
         "contact_duration": lambda: float(summary[END_TIME]),
         "head_angular_velocity": lambda: float(np.abs(record[:, SPIN]).max()),
-        "energy_residual": lambda: float((energy - summary[SPENT] - left) / energy),
+        "energy_residual": lambda: float((energy - summary[ABSORBED] - left) / energy),
     }
 
 

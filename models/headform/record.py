@@ -28,7 +28,7 @@ LONGEST_FOOT = 0.005
 """s that this may take at most: a drift is no event (assumed)."""
 SLOWEST = 0.05
 """s in which an impact takes half of the speed at least: a softer rise is none (assumed)."""
-MOST = 0.5
+MAX_COUNT = 0.5
 """Share of the speed that an impact takes at least; a rebound takes more than all of it."""
 STOPPED = 0.97
 """Share of the speed from which on a headform counts as stopped: speed and mass are not exact."""
@@ -40,13 +40,13 @@ SPIKE = 0.2
 """Share of the largest average from which on a single sample is a spike."""
 LONELY = 0.25
 """Share of a spike by which its neighbours may differ from each other."""
-FEWEST_QUIET = 20
+MIN_QUIET = 20
 """Samples between a disturbance and contact that are kept as quiet, if there are so many."""
 TOP, SHOULDER = 0.99, 0.95
 """Shares of the peak whose durations tell a plateau from a round peak (assumed)."""
 CLIPPED = 0.7
 """Their ratio from which on a peak seems clipped: of a parabola it is 0.45 (assumed)."""
-FEWEST_FLAT = 4
+MIN_FLAT = 4
 """Samples that a plateau has at least."""
 
 
@@ -92,7 +92,7 @@ def first_impact(
     """
     t = np.asarray(time, dtype=np.float64)
     a = np.array(acceleration, dtype=np.float64)
-    if t.size < FEWEST_FLAT or not (np.all(np.isfinite(a)) and speed > 0.0):
+    if t.size < MIN_FLAT or not (np.all(np.isfinite(a)) and speed > 0.0):
         return Impact(t, a, ())
     step = float(t[-1] - t[0]) / (t.size - 1)
     around = round(max(reach, WINDOW) / step)
@@ -101,7 +101,7 @@ def first_impact(
     events = _events(a - base, step, speed)
     impact = next(
         (k for k, e in enumerate(events)
-         if e.speed >= MOST * speed and (e.stop - e.start) * step >= SHORTEST),
+         if e.speed >= MAX_COUNT * speed and (e.stop - e.start) * step >= SHORTEST),
         None,
     )  # fmt: skip
     if impact is None:
@@ -121,7 +121,7 @@ def first_impact(
             "impact, is left out"
         )
         begin, end = event.start - around, event.stop + around
-        if own.start - end >= FEWEST_QUIET:
+        if own.start - end >= MIN_QUIET:
             first = end
         else:
             a[max(begin, 0) : min(end, own.start)] = base
@@ -213,7 +213,7 @@ def _clipping(t: Array, a: Array) -> str:
     """Return what to say of a peak that looks clipped, or nothing."""
     top = float(a.max())
     flat = a >= TOP * top
-    if flat.sum() < FEWEST_FLAT or flat.sum() < CLIPPED * np.sum(a >= SHOULDER * top):
+    if flat.sum() < MIN_FLAT or flat.sum() < CLIPPED * np.sum(a >= SHOULDER * top):
         return ""
     return (
         f"the largest reading, {top:.4g} g, stands for {flat.sum()} samples from "

@@ -167,8 +167,8 @@ def total_energy(tree, motion, road):
                 + motion.rotation[i, 2, k] * motion.angular_velocity[i, 2]
             )
             energy += 0.5 * m * v * v + 0.5 * tree.inertia[i, k] * w * w
-        energy += m * road.weight * motion.centre[i, 2]
-        energy -= m * road.pull * motion.centre[i, 0]
+        energy += m * road.gravity_down * motion.centre[i, 2]
+        energy -= m * road.gravity_along * motion.centre[i, 0]
     return energy
 
 
@@ -183,9 +183,9 @@ def evaluate(model, data):
         contacts.zone_force[j] = 0.0
     update_kinematics(tree, motion)
     for i in range(tree.mass.shape[0]):
-        loads.force[i, 0] = tree.mass[i] * road.pull
+        loads.force[i, 0] = tree.mass[i] * road.gravity_along
         loads.force[i, 1] = 0.0
-        loads.force[i, 2] = -tree.mass[i] * road.weight
+        loads.force[i, 2] = -tree.mass[i] * road.gravity_down
         loads.torque[i, 0] = 0.0
         loads.torque[i, 1] = 0.0
         loads.torque[i, 2] = 0.0
@@ -251,9 +251,9 @@ def _write_record(row, time, model, data):
     motion, loads, record, road = data.motion, data.loads, data.record, model.road
     head = model.settings.head
     ax, ay, az = centre_acceleration(motion, loads, head)
-    record[row, Column.ACCELERATION] = ax - road.pull
+    record[row, Column.ACCELERATION] = ax - road.gravity_along
     record[row, Column.ACCELERATION + 1] = ay
-    record[row, Column.ACCELERATION + 2] = az + road.weight
+    record[row, Column.ACCELERATION + 2] = az + road.gravity_down
     for k in range(3):
         w, q = 0.0, 0.0
         for j in range(3):

@@ -39,7 +39,7 @@ def solve_accelerations(tree, motion, loads):
 @inlined_kernel
 def _sweep_to_root(tree, motion, loads):
     n = tree.mass.shape[0]
-    loads.gathered[:] = 0.0
+    loads.articulated[:] = 0.0
     for i in range(n - 1, -1, -1):
         m = tree.mass[i]
         rx, ry, rz = motion.offset[i, 0], motion.offset[i, 1], motion.offset[i, 2]
@@ -67,36 +67,44 @@ def _sweep_to_root(tree, motion, loads):
         px = m * (wx * wr - rx * ww) - fx
         py = m * (wy * wr - ry * ww) - fy
         pz = m * (wz * wr - rz * ww) - fz
-        sx = loads.gathered[i, 24] + wy * hz - wz * hy + ry * pz - rz * py - loads.torque[i, 0]
-        sy = loads.gathered[i, 25] + wz * hx - wx * hz + rz * px - rx * pz - loads.torque[i, 1]
-        sz = loads.gathered[i, 26] + wx * hy - wy * hx + rx * py - ry * px - loads.torque[i, 2]
-        px += loads.gathered[i, 21]
-        py += loads.gathered[i, 22]
-        pz += loads.gathered[i, 23]
+        sx = loads.articulated[i, 24] + wy * hz - wz * hy + ry * pz - rz * py - loads.torque[i, 0]
+        sy = loads.articulated[i, 25] + wz * hx - wx * hz + rz * px - rx * pz - loads.torque[i, 1]
+        sz = loads.articulated[i, 26] + wx * hy - wy * hx + rx * py - ry * px - loads.torque[i, 2]
+        px += loads.articulated[i, 21]
+        py += loads.articulated[i, 22]
+        pz += loads.articulated[i, 23]
         # M (symmetric), K (full), G (symmetric), children included.
-        M00, M01, M02 = m + loads.gathered[i, 0], loads.gathered[i, 1], loads.gathered[i, 2]
-        M11, M12, M22 = m + loads.gathered[i, 3], loads.gathered[i, 4], m + loads.gathered[i, 5]
+        M00, M01, M02 = (
+            m + loads.articulated[i, 0],
+            loads.articulated[i, 1],
+            loads.articulated[i, 2],
+        )
+        M11, M12, M22 = (
+            m + loads.articulated[i, 3],
+            loads.articulated[i, 4],
+            m + loads.articulated[i, 5],
+        )
         K00, K01, K02 = (
-            loads.gathered[i, 6],
-            loads.gathered[i, 7] - m * rz,
-            loads.gathered[i, 8] + m * ry,
+            loads.articulated[i, 6],
+            loads.articulated[i, 7] - m * rz,
+            loads.articulated[i, 8] + m * ry,
         )
         K10, K11, K12 = (
-            loads.gathered[i, 9] + m * rz,
-            loads.gathered[i, 10],
-            loads.gathered[i, 11] - m * rx,
+            loads.articulated[i, 9] + m * rz,
+            loads.articulated[i, 10],
+            loads.articulated[i, 11] - m * rx,
         )
         K20, K21, K22 = (
-            loads.gathered[i, 12] - m * ry,
-            loads.gathered[i, 13] + m * rx,
-            loads.gathered[i, 14],
+            loads.articulated[i, 12] - m * ry,
+            loads.articulated[i, 13] + m * rx,
+            loads.articulated[i, 14],
         )
-        G00 = Ixx + m * (ry * ry + rz * rz) + loads.gathered[i, 15]
-        G01 = Ixy - m * rx * ry + loads.gathered[i, 16]
-        G02 = Ixz - m * rx * rz + loads.gathered[i, 17]
-        G11 = Iyy + m * (rx * rx + rz * rz) + loads.gathered[i, 18]
-        G12 = Iyz - m * ry * rz + loads.gathered[i, 19]
-        G22 = Izz + m * (rx * rx + ry * ry) + loads.gathered[i, 20]
+        G00 = Ixx + m * (ry * ry + rz * rz) + loads.articulated[i, 15]
+        G01 = Ixy - m * rx * ry + loads.articulated[i, 16]
+        G02 = Ixz - m * rx * rz + loads.articulated[i, 17]
+        G11 = Iyy + m * (rx * rx + rz * rz) + loads.articulated[i, 18]
+        G12 = Iyz - m * ry * rz + loads.articulated[i, 19]
+        G22 = Izz + m * (rx * rx + ry * ry) + loads.articulated[i, 20]
         # Inverse of G.
         c00 = G11 * G22 - G12 * G12
         c01 = G02 * G12 - G01 * G22
@@ -173,33 +181,33 @@ def _sweep_to_root(tree, motion, loads):
         L00, L01, L02 = M01 * dz - M02 * dy, M02 * dx - M00 * dz, M00 * dy - M01 * dx
         L10, L11, L12 = M11 * dz - M12 * dy, M12 * dx - M01 * dz, M01 * dy - M11 * dx
         L20, L21, L22 = M12 * dz - M22 * dy, M22 * dx - M02 * dz, M02 * dy - M12 * dx
-        loads.gathered[parent, 0] += M00
-        loads.gathered[parent, 1] += M01
-        loads.gathered[parent, 2] += M02
-        loads.gathered[parent, 3] += M11
-        loads.gathered[parent, 4] += M12
-        loads.gathered[parent, 5] += M22
-        loads.gathered[parent, 6] += L00
-        loads.gathered[parent, 7] += L01
-        loads.gathered[parent, 8] += L02
-        loads.gathered[parent, 9] += L10
-        loads.gathered[parent, 10] += L11
-        loads.gathered[parent, 11] += L12
-        loads.gathered[parent, 12] += L20
-        loads.gathered[parent, 13] += L21
-        loads.gathered[parent, 14] += L22
-        loads.gathered[parent, 15] += dz * L10 - dy * L20
-        loads.gathered[parent, 16] += dz * L11 - dy * L21
-        loads.gathered[parent, 17] += dz * L12 - dy * L22
-        loads.gathered[parent, 18] += dx * L21 - dz * L01
-        loads.gathered[parent, 19] += dx * L22 - dz * L02
-        loads.gathered[parent, 20] += dy * L02 - dx * L12
-        loads.gathered[parent, 21] += bx
-        loads.gathered[parent, 22] += by
-        loads.gathered[parent, 23] += bz
-        loads.gathered[parent, 24] += dy * bz - dz * by + tx
-        loads.gathered[parent, 25] += dz * bx - dx * bz + ty
-        loads.gathered[parent, 26] += dx * by - dy * bx + tz
+        loads.articulated[parent, 0] += M00
+        loads.articulated[parent, 1] += M01
+        loads.articulated[parent, 2] += M02
+        loads.articulated[parent, 3] += M11
+        loads.articulated[parent, 4] += M12
+        loads.articulated[parent, 5] += M22
+        loads.articulated[parent, 6] += L00
+        loads.articulated[parent, 7] += L01
+        loads.articulated[parent, 8] += L02
+        loads.articulated[parent, 9] += L10
+        loads.articulated[parent, 10] += L11
+        loads.articulated[parent, 11] += L12
+        loads.articulated[parent, 12] += L20
+        loads.articulated[parent, 13] += L21
+        loads.articulated[parent, 14] += L22
+        loads.articulated[parent, 15] += dz * L10 - dy * L20
+        loads.articulated[parent, 16] += dz * L11 - dy * L21
+        loads.articulated[parent, 17] += dz * L12 - dy * L22
+        loads.articulated[parent, 18] += dx * L21 - dz * L01
+        loads.articulated[parent, 19] += dx * L22 - dz * L02
+        loads.articulated[parent, 20] += dy * L02 - dx * L12
+        loads.articulated[parent, 21] += bx
+        loads.articulated[parent, 22] += by
+        loads.articulated[parent, 23] += bz
+        loads.articulated[parent, 24] += dy * bz - dz * by + tx
+        loads.articulated[parent, 25] += dz * bx - dx * bz + ty
+        loads.articulated[parent, 26] += dx * by - dy * bx + tz
 
 
 @inlined_kernel
@@ -207,12 +215,12 @@ def _react(motion, loads, i, parent):
     """Add what a joint that yields demands of the parent: its force and torque, no mass."""
     dx, dy, dz = motion.lever[i, 0], motion.lever[i, 1], motion.lever[i, 2]
     fx, fy, fz = loads.joint_force[i, 0], loads.joint_force[i, 1], loads.joint_force[i, 2]
-    loads.gathered[parent, 21] += fx
-    loads.gathered[parent, 22] += fy
-    loads.gathered[parent, 23] += fz
-    loads.gathered[parent, 24] += dy * fz - dz * fy + loads.joint_torque[i, 0]
-    loads.gathered[parent, 25] += dz * fx - dx * fz + loads.joint_torque[i, 1]
-    loads.gathered[parent, 26] += dx * fy - dy * fx + loads.joint_torque[i, 2]
+    loads.articulated[parent, 21] += fx
+    loads.articulated[parent, 22] += fy
+    loads.articulated[parent, 23] += fz
+    loads.articulated[parent, 24] += dy * fz - dz * fy + loads.joint_torque[i, 0]
+    loads.articulated[parent, 25] += dz * fx - dx * fz + loads.joint_torque[i, 1]
+    loads.articulated[parent, 26] += dx * fy - dy * fx + loads.joint_torque[i, 2]
 
 
 @inlined_kernel

@@ -70,7 +70,7 @@ class Loads(NamedTuple):
         point (its parent feels the opposite, there); 0 for the root.
     joint_acceleration : (n, 3) m/s2, acceleration of the joint point (root: centre of mass).
     angular_acceleration : (n, 3) rad/s2.
-    gathered : (n, 27) workspace: what the children add to M, K, G, p and s.
+    articulated : (n, 27) workspace: what the children add to M, K, G, p and s.
     gain, free_spin : (n, 3, 3), (n, 3) workspace: alpha = free_spin + gain^T a_J.
     """
 
@@ -80,7 +80,7 @@ class Loads(NamedTuple):
     joint_force: Array
     joint_acceleration: Array
     angular_acceleration: Array
-    gathered: Array
+    articulated: Array
     gain: Array
     free_spin: Array
 

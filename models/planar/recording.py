@@ -38,8 +38,8 @@ def write_row(row, time, model, data):
         spin_rate = (state[head, SPIN] - memory[Memory.SPIN]) / length
         ax = (state[head, SPEED_X] - memory[Memory.SPEED_X]) / length
         az = (state[head, SPEED_Z] - memory[Memory.SPEED_Z]) / length
-        record[row - 1, Column.ACCELERATION] = ax - road.pull
-        record[row - 1, Column.ACCELERATION + 2] = az + road.weight
+        record[row - 1, Column.ACCELERATION] = ax - road.gravity_along
+        record[row - 1, Column.ACCELERATION + 2] = az + road.gravity_down
         for k in range(3):
             record[row - 1, Column.SPIN_RATE + k] = -spin_rate * body.normal[head, k]
             # The last row has no step after it.

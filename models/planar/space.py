@@ -95,7 +95,7 @@ class PlanarSpace:
         speed: float,
     ) -> None:
         self.space = space = pymunk.Space()
-        space.gravity = road.pull, -road.weight
+        space.gravity = road.gravity_along, -road.gravity_down
         space.iterations = ITERATIONS
         space.collision_slop = SLOP
         space.collision_bias = math.exp(-1.0 / CONTACT_RELAXATION)

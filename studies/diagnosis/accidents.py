@@ -41,9 +41,9 @@ Array = NDArray[np.float64]
 
 POOL, PAIRED = 480, 120
 """Runs of the model as it stands, and of each form of a cause."""
-FARTHEST = 2.5
+MAX_SCORE = 2.5
 """Score at which the sizes of causes that are tried end."""
-MOST_FAILED = 0.2
+MAX_FAILED = 0.2
 """Share of runs that may fail."""
 WIDER = 1.5
 """Factor on the recorded uncertainties for the draws, so that the surface reaches beyond them."""
@@ -187,7 +187,7 @@ def _run(
     rows = np.stack([columns[item.name][:count] for item in model.inputs], axis=1)
     table = evaluator_of(model, choice.options, switched).evaluate(rows).outputs
     failed = float(np.isnan(table).all(axis=1).mean())
-    if failed > MOST_FAILED:
+    if failed > MAX_FAILED:
         raise StudyError(f"{100.0 * failed:.0f} % of the runs over the accidents failed")
     return table
 
@@ -225,7 +225,7 @@ def _change_of(
 ) -> Change | None:
     """Return what a form changes, from runs of the same draws with and without it."""
     rng = seeds.generator(seed, seeds.OUTCOME)
-    scores = rng.uniform(-FARTHEST, FARTHEST, (PAIRED, len(form.free)))
+    scores = rng.uniform(-MAX_SCORE, MAX_SCORE, (PAIRED, len(form.free)))
     columns = dict(draws.columns)
     for k, parameter in enumerate(form.free):
         values = np.full(POOL, value_at(parameter.prior, 0.0))

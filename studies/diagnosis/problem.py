@@ -29,7 +29,7 @@ BEFORE = 1e-3
 """s before the first sizeable sample up to which a signal counts as noise, at least."""
 SIZEABLE = 0.05
 """Share of the peak from which a sample is sizeable."""
-FEWEST = 3
+MIN_COUNT = 3
 """Tests below which a diagnosis makes no sense."""
 
 
@@ -56,8 +56,8 @@ def build_problem(data: Measured, choice: ModelChoice, simulation: Simulation) -
                     f"{place}: model {choice.name!r} has no input {name!r}; it has "
                     f"{', '.join(inputs)}"
                 )
-    if len(data.tests) < FEWEST:
-        raise UserError(f"{data.source / 'tests.csv'}: a diagnosis takes {FEWEST} tests or more")
+    if len(data.tests) < MIN_COUNT:
+        raise UserError(f"{data.source / 'tests.csv'}: a diagnosis takes {MIN_COUNT} tests or more")
     noise = _noise_of(data, channel_units(model, list(header.signals)))
     tests = tuple(_test(data, model, k, choice.fixed, noise) for k in range(len(data.tests)))
     refused = computed_channels(

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcstudy.diagnosis.gain import Gain, Quantity, measure_gain
-from mcstudy.diagnosis.naming import Candidate, calmed
-from mcstudy.diagnosis.power import smallest_visible, worth_of
+from mcstudy.diagnosis.model_selection import Candidate, with_given_scatter
+from mcstudy.diagnosis.power import minimum_detectable_effects, value_of_information
 from mcstudy.diagnosis.problem import Cause, Problem
 from mcstudy.diagnosis.regions import locate_misfit
 from mcstudy.diagnosis.search import Finding, search
@@ -117,10 +117,12 @@ def _write(
     layouts = finding.layouts
     where = locate_misfit(finding.base, layouts)
     believed = finding.best or finding.base
-    calm = calmed(problem, layouts, finding.base, believed.scatter)
-    visible = smallest_visible(problem, layouts, calm, causes, finding.screening.threshold)
+    calm = with_given_scatter(problem, layouts, finding.base, believed.scatter)
+    visible = minimum_detectable_effects(
+        problem, layouts, calm, causes, finding.screening.threshold
+    )
     near = [c for c in finding.candidates[1:] if c.cause.name in finding.ambiguous][:RIVALS]
-    worth = worth_of(
+    worth = value_of_information(
         problem, layouts, believed, [c.fitted for c in near], causes, extras_of(problem, simulation)
     )
     gains: list[Gain] = []

@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 SPEED = "impact_speed"
 BINS = 24
 """Parts of equal width along the speed, between its outermost hundredths (assumed)."""
-FEWEST_IN_BIN = 10
+MIN_IN_BIN = 10
 RESAMPLES = 400
 HEAD_LEVELS = (2, 3, 5)
 """AIS levels of the head that are followed."""
-FEWEST = 240
+MIN_COUNT = 240
 """Runs below which no curve is drawn (assumed)."""
 
 
@@ -53,7 +53,7 @@ def describe_speed(
         if set(scenario.inputs) | set(scenario.fixed) <= {SPEED}
     ]
     held = cases[cases["scenario"].isin(alike)]
-    if len(held) < FEWEST:
+    if len(held) < MIN_COUNT:
         return None
     wanted = _wanted(study, held)
     speed = 3.6 * held[SPEED].to_numpy(dtype=float)
@@ -67,7 +67,7 @@ def describe_speed(
     weights, speeds = np.zeros(cells), np.zeros(cells)
     np.add.at(weights, (batch, place), weight)
     np.add.at(speeds, (batch, place), weight * speed)
-    filled = np.bincount(place, minlength=BINS) >= FEWEST_IN_BIN
+    filled = np.bincount(place, minlength=BINS) >= MIN_IN_BIN
     weights, speeds = weights[:, filled], speeds[:, filled]
     middle = speeds.sum(axis=0) / weights.sum(axis=0)
     reference = (held["scenario"] == REFERENCE).to_numpy()

@@ -10,10 +10,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mcstudy import units
-from mcstudy.agreement import breaking_inputs, compare, split_variance, without_rounding
+from mcstudy.agreement import compare, sources_of_disagreement, split_variance, without_rounding
 from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.results import check_failures, status_counts
-from mcstudy.sensitivity.given_data import FEWEST_RUNS, measure_given_data
+from mcstudy.sensitivity.given_data import MIN_RUNS, measure_given_data
 from mcstudy.statistics import Estimate, scale_of, varies
 from mcstudy.studyfile.study_outputs import check_outputs
 from models.protocol import Model, complete_status
@@ -23,9 +23,9 @@ from studies.runs import describe_ends
 
 Array = NDArray[np.float64]
 
-FEWEST_PAIRS = 20
+MIN_PAIRS = 20
 """Runs with a value by both models below which they are not compared (assumed)."""
-MOST_APART = 5
+MAX_APART = 5
 """Runs that are listed where two models differ most."""
 
 
@@ -88,7 +88,7 @@ def analyse(
         )
         held = values.notna().all(axis=1).to_numpy()
         entry: dict[str, Any] = {"unit": unit_of[name], "rows": int(held.sum())}
-        if held.sum() >= FEWEST_PAIRS:
+        if held.sum() >= MIN_PAIRS:
             table = values.to_numpy(dtype=float)
             entry["variance"] = asdict(split_variance(table[held], parts[held]))
             # Squares of scaled values neither overflow nor vanish.
@@ -107,7 +107,7 @@ def analyse(
     analysis["compared"] = [name for name in outputs if "pairs" in analysis["outputs"][name]]
     if not analysis["compared"]:
         raise StudyError(
-            f"{', '.join(outputs)}: fewer than {FEWEST_PAIRS} runs have a value by every model"
+            f"{', '.join(outputs)}: fewer than {MIN_PAIRS} runs have a value by every model"
         )
     return analysis
 
@@ -150,13 +150,13 @@ def _pair(
     two = without_rounding(one, values[held, 1])
     table = inputs[held].to_numpy(dtype=float)
     found: dict[str, Any] = asdict(compare(one, two, parts[held]))
-    gains, noise = breaking_inputs(one, two, table, study.seed)
+    gains, noise = sources_of_disagreement(one, two, table, study.seed)
     found["breaking"] = {
         "gains": dict(zip(inputs.columns, gains.tolist(), strict=True)),
         "noise": noise,
     }
     difference = two - one
-    if held.sum() >= FEWEST_RUNS:
+    if held.sum() >= MIN_RUNS:
         given = measure_given_data(table, difference, study.seed)
         shares = given.values["first_order"]
         found["disagreement"] = {
@@ -168,7 +168,7 @@ def _pair(
         }
     if not varies(difference):
         return found | {"most_apart": []}
-    worst = np.argsort(-np.abs(difference - difference.mean()), kind="stable")[:MOST_APART]
+    worst = np.argsort(-np.abs(difference - difference.mean()), kind="stable")[:MAX_APART]
     runs = np.flatnonzero(held)[worst]
     found["most_apart"] = [
         {

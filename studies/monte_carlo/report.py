@@ -42,11 +42,11 @@ def sections_of(
         Section("Result", _summary(study, model, analysis), [_output_table(study, model, analysis)],
                 pick("distributions")),
         Section("The accident", _accident(analysis, model), (), pick("throw_and_wad")),
-        Section("What goes with what", (
+        Section("Rank correlations", (
             "Rank correlations say which inputs an output follows, one at a time; they are no "
             "share of variance.",), (), pick("impact_speed", "rank_correlation")),
         Section("Inputs", (), [_input_table(study, model, runs)]),
-        Section("How sure the numbers are", [_honesty(study), *failures_said(analysis)],
+        Section("Sampling uncertainty", [_honesty(study), *failures_said(analysis)],
                 [status_table(analysis)], pick("convergence", "failures")),
         Section("The model", _model_notes(model)),
     ]  # fmt: skip

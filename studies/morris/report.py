@@ -5,7 +5,7 @@ from typing import Any
 
 from mcstudy.figures import screening, style
 from mcstudy.report import Section, Table
-from mcstudy.sampling.factors import DUMMY, NUDGE
+from mcstudy.sampling.factors import DUMMY, PERTURBATION
 from mcstudy.sampling.morris import TAIL
 from mcstudy.text import capital, interval, number, unit
 from models.protocol import Model
@@ -56,12 +56,12 @@ def sections_of(
                   "depends on the other factors or on where they stand. Groups have no σ."),
         ),
         Section(
-            "How sure the numbers are",
+            "Sampling uncertainty",
             [
                 f"Each of {analysis['trajectories']:,} trajectories changes one factor after the "
-                f"other by one large step between {study.design.levels} levels. The dummy nudges "
-                f"every input by {NUDGE:g} of its range: its effect is the model's noise floor. "
-                f"Intervals are 95 %, by {study.report.resamples:,} bootstrap resamples of "
+                f"other by one large step between {study.design.levels} levels. The dummy perturbs "
+                f"every input by {PERTURBATION:g} of its range: its effect is the model's noise "
+                f"floor. Intervals are 95 %, by {study.report.resamples:,} bootstrap resamples of "
                 "trajectories. A Morris study ranks factors; shares of variance take a Sobol' "
                 "study of those that matter.",
                 *failures_said(analysis, "trajectories"),
@@ -98,7 +98,7 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     )
     lines = [f"{capital(title)} is moved most by {named}."]
     curved = [
-        f for f in clear[:NAMED] if (factors[f]["spread"] or 0.0) > CURVED * factors[f]["value"]
+        f for f in clear[:NAMED] if (factors[f]["sigma"] or 0.0) > CURVED * factors[f]["value"]
     ]
     if curved:
         lines.append(
@@ -136,7 +136,7 @@ def _table(name: str, entry: Mapping[str, Any]) -> Table:
     order = sorted(factors, key=lambda f: -factors[f]["value"])
     rows = [
         [style.words(f), interval(factors[f]), number(factors[f]["mean"]),
-         number(factors[f]["spread"])]
+         number(factors[f]["sigma"])]
         for f in order
     ]  # fmt: skip
     caption = (

@@ -4,14 +4,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from mcstudy.sensitivity.blocks import FEWEST_BLOCKS
+from mcstudy.sensitivity.blocks import MIN_BLOCKS
 from mcstudy.studyfile.schema import FactorReport, FactorStudy, StudyTable
 
 
 class MorrisDesign(StudyTable):
     """``[design]`` of a Morris study: trajectories and levels of the grid."""
 
-    n: Annotated[int, Field(ge=FEWEST_BLOCKS, le=100_000)] = 50
+    n: Annotated[int, Field(ge=MIN_BLOCKS, le=100_000)] = 50
     levels: Annotated[int, Field(ge=4, le=20)] = 4
 
     @model_validator(mode="after")

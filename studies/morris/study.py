@@ -153,14 +153,14 @@ def analyse(study: MorrisStudy, model: Model, runs: pd.DataFrame) -> dict[str, A
 
 
 def _by_factor(found: ElementaryEffects, factors: tuple[str, ...]) -> dict[str, dict[str, Any]]:
-    table = zip(factors, found.mean, found.mean_size.T, found.spread, strict=True)
+    table = zip(factors, found.mean, found.mu_star.T, found.sigma, strict=True)
     return {
         name: {
             "mean": float(mean),
             **Estimate(*size.tolist()).as_dict(),
-            "spread": float(spread),
+            "sigma": float(spread),
             # The last factor is the dummy.
-            "clear": bool(size[1] > found.mean_size[2, -1]),
+            "clear": bool(size[1] > found.mu_star[2, -1]),
         }
         for name, mean, size, spread in table
     }

@@ -12,7 +12,7 @@ from mcstudy.errors import StudyError
 from mcstudy.sampling import seeds
 from mcstudy.sampling.factors import DUMMY, factors_of
 from mcstudy.sampling.saltelli import block_size, is_base_row
-from mcstudy.sensitivity.blocks import FEWEST_BLOCKS, is_enough, outputs_alike, whole_blocks
+from mcstudy.sensitivity.blocks import MIN_BLOCKS, is_enough, outputs_alike, whole_blocks
 from mcstudy.sensitivity.sobol import Indices, estimate_indices, split_blocks
 from mcstudy.statistics import Estimate
 from mcstudy.studyfile.study_outputs import report_outputs
@@ -172,7 +172,7 @@ def _convergence(
     """Return first and total indices on growing parts of the base points."""
     steps = []
     n = cube.shape[0]
-    for size in sorted({n >> k for k in range(STEPS) if n >> k >= FEWEST_BLOCKS}):
+    for size in sorted({n >> k for k in range(STEPS) if n >> k >= MIN_BLOCKS}):
         found = _indices(study, cube[:size], scramble[:size], len(factors), STEP_RESAMPLES)
         entry = _entry(found, 0, factors)
         steps.append({"n": size, "first": entry["first"], "total": entry["total"]})

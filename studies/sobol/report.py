@@ -5,7 +5,7 @@ from typing import Any
 
 from mcstudy.figures import sensitivity, style
 from mcstudy.report import Section, Table
-from mcstudy.sampling.factors import DUMMY, NUDGE
+from mcstudy.sampling.factors import DUMMY, PERTURBATION
 from mcstudy.sampling.saltelli import SCRAMBLES
 from mcstudy.text import capital, quantity, share
 from models.protocol import Model
@@ -98,13 +98,15 @@ def sections_of(
         *sections,
         Section(
             "The model's noise floor",
-            (f"The dummy nudges every input by {NUDGE:g} of its range. An output that follows its "
-             "inputs does not feel that; what it does to a chaotic one, no input explains, however "
-             "well it is known.",),
+(
+                f"The dummy perturbs every input by {PERTURBATION:g} of its range. An output that "
+                "follows its inputs does not feel that; what it does to a chaotic one, no input "
+                "explains, however well it is known.",
+            ),
             [_noise_table(analysis)],
         ),
         Section(
-            "How sure the numbers are",
+            "Sampling uncertainty",
             [
                 _convergence_said(analysis),
                 _intervals_said(study),
@@ -182,9 +184,9 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
             f"{', '.join(style.words(f) for f in weak)}."
         )
     lines.append(
-        f"{_share(noise)} of the variance belongs to no input: a nudge of all inputs by "
-        f"{NUDGE:g} of their range makes {title} scatter by {_quantity(entry['noise_sd'], entry)} "
-        "(standard deviation)."
+        f"{_share(noise)} of the variance belongs to no input: a perturbation of all "
+        f"inputs by {PERTURBATION:g} of their range makes {title} scatter by "
+        f"{_quantity(entry['noise_sd'], entry)} (standard deviation)."
     )
     return " ".join(capital(line) for line in lines)
 

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 FILE = "q3_child_dummy_head_impact.csv"
 COLUMNS = ("test_speed_m_s", "time_ms", "head_acc_g", "impact_force_N")
-FEWEST_SAMPLES = 20
+MIN_SAMPLES = 20
 """Samples of one impact, at least."""
 ROBOT = 133.0
 """kg [found]."""
@@ -146,8 +146,8 @@ def _read(path: Path) -> list[_Impact]:
     for part in groups:
         speed, ms, acceleration, force = part.to_numpy().T
         t = 1e-3 * ms
-        if t.size < FEWEST_SAMPLES or np.any(np.diff(t) <= 0.0):
-            raise ValueError(f"time must rise, over {FEWEST_SAMPLES} samples or more")
+        if t.size < MIN_SAMPLES or np.any(np.diff(t) <= 0.0):
+            raise ValueError(f"time must rise, over {MIN_SAMPLES} samples or more")
         if not (force.max() > 0.0 and acceleration.max() > 0.0 and acceleration.min() >= 0.0):
             raise ValueError("force and acceleration must be positive somewhere")
         head = STANDARD_GRAVITY * cumulative_trapezoid(acceleration, t, initial=0)

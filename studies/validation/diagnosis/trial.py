@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mcstudy.diagnosis.fit import fit
 from mcstudy.diagnosis.layout import Scatter
-from mcstudy.diagnosis.naming import rescale
+from mcstudy.diagnosis.model_selection import rescale
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.diagnosis.screening import POWER
 from mcstudy.diagnosis.search import UNEXPLAINED, Finding, fit_base, search

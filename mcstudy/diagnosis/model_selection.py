@@ -37,25 +37,25 @@ DISTINCT = 3.0
 """Log units of evidence within which causes cannot be told apart, and below which none is named."""
 STRUCTURE = 0.01
 """p-value below which a fit leaves structure behind."""
-MOST_OF_IT = 0.8
+MAX_SHARE = 0.8
 """Share of the explained misfit from which a cause is named although something remains."""
-SURVEY = Scatter(0.02, 0.02)
+SCAN = Scatter(0.02, 0.02)
 """Repeatability with which forms are tried before it is estimated."""
 UNSEEN = 0.05
 """Sum of squares over the noise below which a form changes nothing that was measured."""
 FAR = 0.7
 """Weight of the data below which a fit begins far away."""
-FARTHEST_START = 3.0
+MAX_START = 3.0
 """Score beyond which no fit begins."""
 CLOSE, WORSE = 60.0, 1.4
 """Log units and factor by which a form far from the data may fit worse than the best."""
 MODEST, SLIGHT = 4.0, 6.0
 """Factor and log units by which a form near the data may promise less than the best."""
-HOPELESS = 1.5
+PRUNING_RATIO = 1.5
 """Factor on the best misfit beyond which a form is not fitted any further."""
 STAGE_STEPS = 6
 """Steps of a first fit."""
-FEWEST = 6
+MIN_COUNT = 6
 """Forms that are refitted whatever they promise."""
 
 
@@ -88,7 +88,9 @@ def settle(problem: Problem, layouts: Sequence[Layout], fitted: Fit) -> Fit:
     return fitted
 
 
-def calmed(problem: Problem, layouts: Sequence[Layout], fitted: Fit, scatter: Scatter) -> Fit:
+def with_given_scatter(
+    problem: Problem, layouts: Sequence[Layout], fitted: Fit, scatter: Scatter
+) -> Fit:
     """Return a fit with another repeatability: what a misfit was taken for is none of it."""
     if scatter == fitted.scatter:
         return fitted
@@ -158,7 +160,7 @@ def survey(
         tried: list[tuple[float, Scores]] = []
         for scores in score_grid(form, fine=weight < FAR):
             start = Scores(np.concatenate([centre.scores.shared, scores]), centre.scores.own)
-            residuals = residuals_at(problem, layouts, (*forms, form), start, SURVEY)
+            residuals = residuals_at(problem, layouts, (*forms, form), start, SCAN)
             if residuals is None:
                 continue
             for found, before in zip(residuals, centre.residuals, strict=True):
@@ -166,8 +168,8 @@ def survey(
             solved, misfit = solve(centre, residuals, weight)
             halfway = [0.5 * (r + b) for r, b in zip(residuals, centre.residuals, strict=True)]
             promise = max(promise, _gain(without, solve(centre, halfway, weight)[1], misfit))
-            shared = np.clip(solved.shared, -FARTHEST_START, FARTHEST_START)
-            own = tuple(np.clip(z, -FARTHEST_START, FARTHEST_START) for z in solved.own)
+            shared = np.clip(solved.shared, -MAX_START, MAX_START)
+            own = tuple(np.clip(z, -MAX_START, MAX_START) for z in solved.own)
             whole = misfit + 0.5 * float(scores @ scores)
             tried.append((whole, Scores(np.concatenate([shared, scores]), own)))
         if tried:
@@ -206,15 +208,13 @@ def approach(
         try:
             for stage in (surveyed.weight, np.sqrt(surveyed.weight)) if surveyed.far else ():
                 found = fit(
-                    problem, layouts, forms, start, SURVEY, slopes,
+                    problem, layouts, forms, start, SCAN, slopes,
                     exact=False, weight=stage, most=STAGE_STEPS,
                 )  # fmt: skip
                 slopes = found.slopes
                 # What tests put down to nuisances while the shared values were wrong is forgotten.
                 start = Scores(found.scores.shared, tuple(np.zeros_like(z) for z in start.own))
-            found = fit(
-                problem, layouts, forms, start, SURVEY, slopes, exact=False, most=STAGE_STEPS
-            )
+            found = fit(problem, layouts, forms, start, SCAN, slopes, exact=False, most=STAGE_STEPS)
         except FitError:
             continue
         if best is None or found.log_evidence > best.log_evidence:
@@ -243,22 +243,22 @@ def rank_causes(
     shared = base.scores.shared.copy()
     shared[:unknowns] = 0.0
     own = tuple(np.zeros_like(z) for z in base.scores.own)
-    places = (Scores(shared, own), rescale(layouts, base, SURVEY))
-    found = (linearise(problem, layouts, base.forms, place, SURVEY) for place in places)
+    places = (Scores(shared, own), rescale(layouts, base, SCAN))
+    found = (linearise(problem, layouts, base.forms, place, SCAN) for place in places)
     centres = [centre for centre in found if centre is not None]
     taken = {form.cause for form in base.forms}
     forms = [form for c in causes if c.name not in taken for form in c.forms]
-    surveys = run_jobs(partial(survey, problem, layouts, base.forms, centres), forms, workers)
-    seen = sorted((s for s in surveys if s is not None), key=lambda s: s.misfit)
+    scans = run_jobs(partial(survey, problem, layouts, base.forms, centres), forms, workers)
+    seen = sorted((s for s in scans if s is not None), key=lambda s: s.misfit)
     best = max((s.promise for s in seen), default=0.0)
     promising = [
-        s for k, s in enumerate(seen[:most]) if k < FEWEST or _may_win(s, seen[0].misfit, best)
+        s for k, s in enumerate(seen[:most]) if k < MIN_COUNT or _may_win(s, seen[0].misfit, best)
     ]
     first = run_jobs(partial(approach, problem, layouts, base.forms), promising, workers)
     reached = [found for found in first if found is not None]
     least = min((found.misfit for found in reached), default=0.0)
     # Only what is not hopeless beside the best is worth its repeatability.
-    kept = [found for found in reached if found.misfit < HOPELESS * least + CLOSE]
+    kept = [found for found in reached if found.misfit < PRUNING_RATIO * least + CLOSE]
     fits = run_jobs(partial(settle, problem, layouts), kept, workers)
     candidates = []
     for cause in causes:

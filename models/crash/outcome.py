@@ -17,7 +17,6 @@ from models.criteria import (
     clip_level,
     effective_mass,
     filter_cfc,
-    head_injury_criterion,
     impact_angle,
 )
 from models.criteria.hic import cumulative_area, maximise_window
@@ -156,7 +155,8 @@ def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
         return maximise_window(time[car], signals.acceleration[car], area(), window)[0]
 
     def ground_hic() -> float:
-        return head_injury_criterion(time[road], signals.acceleration[road], 0.015)[0]
+        felt = signals.acceleration[road]
+        return maximise_window(time[road], felt, cumulative_area(time[road], felt), 0.015)[0]
 
     def clip(mode: str) -> float:
         return clip_level(time[car], signals.acceleration[car], mode=mode)

@@ -18,11 +18,13 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from models.compilation import kernel
+from models.compilation import kernel, unfused_kernel
 
 Array = NDArray[np.float64]
 
 
+BLOCK = 8
+"""Windows with one start that one bound rules out together."""
 SLACK = 1.0 - 1e-9
 """Share of the best value that a bound must reach: rounding must rule out no maximum."""
 
@@ -87,12 +89,17 @@ def _grid_maximum(t, a, s, window, peak):
         bar = max(best, floor)
         if (s[last] - s[i]) * peak * math.sqrt(peak) <= bar:
             continue
-        for j in range(i + 1, last + 1):
-            area, length = s[j] - s[i], t[j] - t[i]
-            if _may_beat(area, length, max(best, floor)):
-                value = _value(area, length)
-                if value > best:
-                    best, b1, b2 = value, t[i], t[j]
+        start = i + 1
+        while start <= last:
+            stop = min(start + BLOCK, last + 1)
+            if _may_beat(s[stop - 1] - s[i], t[start] - t[i], max(best, floor)):
+                for j in range(start, stop):
+                    area, length = s[j] - s[i], t[j] - t[i]
+                    if _may_beat(area, length, max(best, floor)):
+                        value = _value(area, length)
+                        if value > best:
+                            best, b1, b2 = value, t[i], t[j]
+            start = stop
     return best, b1, b2
 
 
@@ -245,16 +252,18 @@ def _continuous_maximum(t, a, s, window, peak):
             last += 1
         if (s[last + 1] - s[i]) * power <= best:
             continue
-        for j in range(i + 1, last + 1):
-            area = s[j + 1] - s[i]
-            if area * power <= best:
-                continue
-            shortest = t[j] - t[i + 1]
-            if not _may_beat(area, shortest, best):
-                continue
-            v, x1, x2 = _free_pair(t, a, s, i, j, window, best)
-            if v > best:
-                best, b1, b2 = v, x1, x2
+        start = i + 1
+        while start <= last:
+            stop = min(start + BLOCK, last + 1)
+            if _may_beat(s[stop] - s[i], t[start] - t[i + 1], best):
+                for j in range(start, stop):
+                    area = s[j + 1] - s[i]
+                    if area * power <= best or not _may_beat(area, t[j] - t[i + 1], best):
+                        continue
+                    v, x1, x2 = _free_pair(t, a, s, i, j, window, best)
+                    if v > best:
+                        best, b1, b2 = v, x1, x2
+            start = stop
     return best, b1, b2
 
 
@@ -313,6 +322,13 @@ def head_injury_criterion(
     return maximise_window(t, a, cumulative_area(t, a), window, method=method)
 
 
+@unfused_kernel
+def _accumulate(t, a, area):
+    area[0] = 0.0
+    for k in range(1, t.size):
+        area[k] = area[k - 1] + 0.5 * (a[k] + a[k - 1]) * (t[k] - t[k - 1])
+
+
 def cumulative_area(time: Array, acceleration: Array) -> Array:
     """Return the area (n,) under a signal up to each sample, joined by straight lines.
 
@@ -323,8 +339,9 @@ def cumulative_area(time: Array, acceleration: Array) -> Array:
     acceleration : (n,) array
         Any unit; the area has it times seconds.
     """
-    parts = 0.5 * (acceleration[1:] + acceleration[:-1]) * np.diff(time)
-    return np.concatenate(([0.0], np.cumsum(parts)))
+    area = np.empty_like(acceleration)
+    _accumulate(time, acceleration, area)
+    return area
 
 
 def maximise_window(

@@ -5,10 +5,11 @@ from pathlib import Path
 
 import joblib
 import numpy as np
+import pandas as pd
 import toy_evaluation
 
 from mcstudy.execution import runner
-from mcstudy.execution.evaluator import CHUNK_TIME, Evaluator
+from mcstudy.execution.evaluator import Evaluator
 from mcstudy.execution.progress import Progress
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.sampling import designs
@@ -18,11 +19,11 @@ SLOWNESS = 0.006
 """s a row: the study takes about as long as its processes take to start."""
 
 
-def work(chunk_time: float = CHUNK_TIME) -> runner.Task:
+def work(slowness: float = SLOWNESS) -> runner.Task:
     """Return the study, in chunks of some s."""
     return runner.Task(
         evaluator=Evaluator(
-            toy_evaluation.evaluate_slowly, SLOWNESS, toy_evaluation.OUTPUTS, chunk_time=chunk_time
+            toy_evaluation.evaluate_slowly, slowness, toy_evaluation.OUTPUTS, chunk_time=0.05
         ),
         inputs=designs.draw("latin-hypercube", N, 20, 2, seed=5),
         input_names=toy_evaluation.NAMES,
@@ -30,12 +31,16 @@ def work(chunk_time: float = CHUNK_TIME) -> runner.Task:
     )
 
 
-def main(path: Path, workers: int) -> None:
-    """Run the study, or go on with it."""
+def complete(path: Path, workers: int = 1, slowness: float = 0.0) -> pd.DataFrame:
+    """Run the study to its end, or go on with it, and return all of its runs."""
     folder = ResultsFolder(path)
     with folder.open_for_writing(), joblib.parallel_config(backend="loky", n_jobs=workers):
-        folder.compact(runner.run(work(0.05), folder, Progress(quiet=True)))
+        found = runner.run(work(slowness), folder, Progress(quiet=True))
+        folder.compact(found)
+    np.testing.assert_array_equal(found["run"], np.arange(N))
+    assert (found["status"] != "crashed").all()
+    return found
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]))
+    complete(Path(sys.argv[1]), 2, SLOWNESS)

@@ -15,18 +15,14 @@ from mcstudy_tools import Array, quiet
 from numpy.testing import assert_array_equal
 
 from mcstudy.errors import UserError
-from mcstudy.studyfile.config import (
-    MonteCarloStudy,
-    Reconstruction,
-    check_outputs,
-    fixed_values,
-    hash_of,
-    load_study,
-    numbers_digest,
-    parse_study,
-    sample_inputs,
-)
+from mcstudy.studyfile.identity import hash_of, numbers_digest
+from mcstudy.studyfile.study_inputs import fixed_values
+from mcstudy.studyfile.study_outputs import check_outputs
 from models.registry import load_model
+from studies.kinds import load_study, parse_study
+from studies.monte_carlo.design import sample_inputs
+from studies.monte_carlo.schema import MonteCarloStudy
+from studies.reconstruction.schema import Reconstruction
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 MODEL = FakeSimulator()
@@ -52,14 +48,11 @@ def complaint(text: str) -> str:
     return str(caught.value)
 
 
-# -- good files ------------------------------------------------------------------------------
-
-
 def test_the_shipped_case_fits_its_model() -> None:
     study = load_study(CONFIGS / "paper_case.toml")
     assert isinstance(study, Reconstruction)
     model = load_model(study.model.name, study.model.options)
-    fixed = fixed_values(study, model)
+    fixed = fixed_values(study.fixed, model)
     assert fixed["impact_speed"] == pytest.approx(100.0 / 9.0)
     assert fixed["dive_angle"] == pytest.approx(math.radians(2.0))
     for table in study.tables:
@@ -107,12 +100,6 @@ def test_a_minimal_study_has_the_documented_defaults() -> None:
     assert sample_inputs(study, MODEL)["stature"].shape == (2000,)
 
 
-def test_files_with_windows_line_ends_are_read(tmp_path: Path) -> None:
-    path = tmp_path / "small.toml"
-    path.write_bytes(STUDY.replace("\n", "\r\n").encode())
-    assert load_study(path) == parse_study(STUDY)
-
-
 def test_a_name_is_that_of_a_folder() -> None:
     for name in ("a", "paper_study", "A-1.b_2", "x" * 80):
         assert monte_carlo(edited(('"small"', json.dumps(name)))).name == name
@@ -120,8 +107,6 @@ def test_a_name_is_that_of_a_folder() -> None:
         message = complaint(edited(('"small"', json.dumps(name))))
         assert "name" in message and "folder" in message
 
-
-# -- bad files -------------------------------------------------------------------------------
 
 DESIGN = 'method = "latin-hypercube"\nn = 40\nreplicate_size = 20'
 NORMAL = 'distribution = "normal"\nunit = "km/h"\nmean = 42.0\nsd = 2.0'
@@ -249,9 +234,6 @@ def test_bad_files_get_one_line_that_names_the_place(row: tuple[Any, ...]) -> No
         assert part in message
 
 
-# -- files -----------------------------------------------------------------------------------
-
-
 def test_files_that_cannot_be_read_are_named_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "binary.toml").write_bytes(bytes(range(256)))
     (tmp_path / "broken.toml").write_text("seed = ")
@@ -262,6 +244,9 @@ def test_files_that_cannot_be_read_are_named_in_one_line(tmp_path: Path) -> None
             load_study(path)
         assert str(caught.value).startswith(f"{path}: ")
         assert len(str(caught.value).splitlines()) == 1
+    # Windows ends its lines otherwise.
+    (tmp_path / "small.toml").write_bytes(STUDY.replace("\n", "\r\n").encode())
+    assert load_study(tmp_path / "small.toml") == parse_study(STUDY)
 
 
 @quiet(200)
@@ -319,9 +304,6 @@ def test_a_mutilated_study_runs_or_is_a_user_error(text: str) -> None:
     except UserError:
         return
     assert all(np.isfinite(values).all() for values in columns.values())
-
-
-# -- the same study --------------------------------------------------------------------------
 
 
 def topics(*edits: tuple[str, str], model: FakeSimulator = MODEL) -> dict[str, str]:

@@ -10,19 +10,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from mcstudy.errors import UserError
 from mcstudy.sampling.factors import DUMMY, factors_of
-from mcstudy.studyfile.config import (
-    MorrisStudy,
-    SobolStudy,
-    check_independent,
-    fixed_values,
-    hash_of,
-    load_study,
-    map_inputs,
-    numbers_digest,
-    parse_study,
-    report_outputs,
-)
+from mcstudy.studyfile.identity import hash_of, numbers_digest
+from mcstudy.studyfile.study_inputs import check_independent, fixed_values, map_inputs
+from mcstudy.studyfile.study_outputs import report_outputs
 from models.registry import load_model
+from studies.kinds import load_study, parse_study
+from studies.morris.schema import MorrisStudy
+from studies.sobol.schema import SobolStudy
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 MODEL = FakeSimulator()
@@ -69,16 +63,13 @@ def complaint(text: str) -> str:
     return str(caught.value)
 
 
-# -- good files ------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ["paper_sobol", "paper_sobol_groups", "paper_morris"])
 def test_shipped_study_files_load_and_fit_their_model(name: str) -> None:
     study = load_study(CONFIGS / f"{name}.toml")
     assert isinstance(study, SobolStudy if "sobol" in name else MorrisStudy)
     check_independent(study)
     model = load_model(study.model.name, study.model.options)
-    fixed_values(study, model)
+    fixed_values(study.fixed, model)
     report_outputs(study, model)
     for p in (0.02, 0.5, 0.98):
         columns = map_inputs(study, model, np.full((1, len(study.inputs)), p))
@@ -116,9 +107,6 @@ def test_values_are_drawn_for_the_uniforms_of_a_design(kind: str) -> None:
     assert changed == {"age", "stature"}
 
 
-# -- dependence ------------------------------------------------------------------------------
-
-
 @each_kind
 def test_dependence_is_allowed_within_a_group_alone(kind: str) -> None:
     check_independent(study_of(kind))
@@ -136,8 +124,6 @@ def test_dependence_is_allowed_within_a_group_alone(kind: str) -> None:
         for part in ("dependence", *map(repr, names), kind, "one group", "monte-carlo"):
             assert part in message
 
-
-# -- bad files -------------------------------------------------------------------------------
 
 # Old and new text, parts of the message. What all kinds share is in test_config.
 BOTH: list[tuple[Any, ...]] = [
@@ -202,9 +188,6 @@ def test_bad_files_get_one_line_that_names_the_place(kind: str, row: tuple[Any, 
         assert part in message
     if parts == ("groups.dummy",):
         assert "an input has this name" not in message
-
-
-# -- the same study --------------------------------------------------------------------------
 
 
 def differing(kind: str, *edits: tuple[str, str], than: tuple[str, str] | None = None) -> set[str]:

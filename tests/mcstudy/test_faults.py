@@ -11,18 +11,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import joblib
 import kill_driver
 import numpy as np
 import pandas as pd
 import psutil
 import pytest
 import toy_evaluation
+from joblib.externals.loky import get_reusable_executor
+from mcstudy_tools import generator
+from numpy.testing import assert_array_equal
 from test_runner import N, run, task
 
 from mcstudy.execution import runner
 from mcstudy.execution.chunk import read_traces
-from mcstudy.execution.progress import Progress
 from mcstudy.execution.results import ResultsFolder, digest
 
 GUILTY = 137
@@ -43,45 +44,45 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
 def fresh_workers() -> Iterator[None]:
     """Leave no broken or hanging worker to the next test."""
     yield
-    from joblib.externals.loky import get_reusable_executor
-
     get_reusable_executor().shutdown(wait=True, kill_workers=True)
 
 
-def fault(kind: int = 0) -> toy_evaluation.Fault:
-    return {"x": float(task().inputs[GUILTY, 0]), "kind": kind}
-
-
-def faulty(evaluate: Any, **more: Any) -> runner.Task:
-    work = task(evaluate=evaluate, argument=fault())
+def faulty(evaluate: Any, kind: int = 0, **more: Any) -> runner.Task:
+    fault = {"x": float(task().inputs[GUILTY, 0]), "kind": kind}
+    work = task(evaluate=evaluate, argument=fault)
     return replace(work, evaluator=replace(work.evaluator, **more))
 
 
-def check_all_but_one(found: pd.DataFrame, reference: pd.DataFrame, status: str) -> str:
+def reason_of(found: pd.DataFrame, reference: pd.DataFrame, status: str) -> str:
     """Return the reason of the guilty row; all others must be as they were."""
-    np.testing.assert_array_equal(found["run"], np.arange(N))
+    assert_array_equal(found["run"], np.arange(N))
     guilty = found.iloc[GUILTY]
     assert guilty["status"] == status
     assert np.isnan(guilty["total"])
-    others = found.drop(index=GUILTY).reset_index(drop=True)
-    pd.testing.assert_frame_equal(others, reference.drop(index=GUILTY).reset_index(drop=True))
+    pd.testing.assert_frame_equal(*(table.drop(index=GUILTY) for table in (found, reference)))
     return str(guilty["reason"])
 
 
-def test_a_row_that_kills_its_process_is_booked_as_crashed(
+def test_a_row_that_kills_its_process_crashed(
     folder: ResultsFolder, reference: pd.DataFrame
 ) -> None:
     found = run(faulty(toy_evaluation.evaluate_and_die), folder, workers=2)
-    assert "died" in check_all_but_one(found, reference, "crashed")
+    assert "died" in reason_of(found, reference, "crashed")
     assert read_traces(folder.path / "running") == []
+
+
+def test_a_process_that_dies_once_costs_no_row(
+    folder: ResultsFolder, reference: pd.DataFrame, tmp_path: Path
+) -> None:
+    work = task(evaluate=toy_evaluation.evaluate_and_die_once, argument=tmp_path / "mark")
+    assert digest(run(work, folder, workers=2)) == digest(reference)
 
 
 def test_a_row_that_hangs_costs_one_timeout(folder: ResultsFolder, reference: pd.DataFrame) -> None:
     # The loop holds the interpreter: no thread and no signal handler of Python's gets through.
-    work = faulty(toy_evaluation.evaluate_and_hang, run_time=4.0)
     start = time.monotonic()
-    found = run(work, folder, workers=2)
-    assert "longer than 4 s" in check_all_but_one(found, reference, "timeout")
+    found = run(faulty(toy_evaluation.evaluate_and_hang, run_time=2.0), folder, workers=2)
+    assert "longer than 2 s" in reason_of(found, reference, "timeout")
     assert time.monotonic() - start < 60.0
 
 
@@ -90,75 +91,78 @@ def test_a_row_that_raises_is_booked_with_its_reason(
     folder: ResultsFolder, reference: pd.DataFrame, workers: int
 ) -> None:
     found = run(faulty(toy_evaluation.evaluate_and_raise), folder, workers=workers)
-    assert check_all_but_one(found, reference, "error") == "ValueError: a bug of two lines"
+    assert reason_of(found, reference, "error") == "ValueError: a bug of two lines"
 
 
-@pytest.mark.parametrize(
-    ("kind", "status", "reason"),
-    [
-        (0, "not_finite", "total has no finite value"),
-        (1, "not_finite", "total has no finite value"),
-        (2, "unphysical", "total = 1e+06 is outside 0 to 2"),
-    ],
-)
+@pytest.mark.parametrize(("kind", "status", "reason"), [
+    (0, "not_finite", "total has no finite value"),
+    (1, "not_finite", "total has no finite value"),
+    (2, "unphysical", "total = 1e+06 is outside 0 to 2"),
+])  # fmt: skip
 def test_a_number_that_is_none_is_never_ok(
     folder: ResultsFolder, reference: pd.DataFrame, kind: int, status: str, reason: str
 ) -> None:
     bounds = np.array([[0.0, 2.0], [-np.inf, np.inf]])
-    work = task(evaluate=toy_evaluation.evaluate_beyond, argument=fault(kind=kind))
-    work = replace(work, evaluator=replace(work.evaluator, bounds=bounds))
-    assert check_all_but_one(run(work, folder), reference, status) == reason
+    found = run(faulty(toy_evaluation.evaluate_beyond, kind, bounds=bounds), folder)
+    assert reason_of(found, reference, status) == reason
 
 
-def complete(path: Path) -> pd.DataFrame:
-    """Return the whole study after some last quiet runs."""
-    folder = ResultsFolder(path)
-    with folder.open_for_writing(), joblib.parallel_config(backend="loky", n_jobs=2):
-        found = runner.run(kill_driver.work(0.05), folder, Progress(quiet=True))
-    np.testing.assert_array_equal(found["run"], np.arange(kill_driver.N))
-    assert (found["status"] != "crashed").all()
-    return found
+# -- kills: processes start anew each time, which takes seconds ------------------------------
 
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
-    return digest(complete(tmp_path_factory.mktemp("undisturbed") / "study"))
+    return digest(kill_driver.complete(tmp_path_factory.mktemp("undisturbed") / "study"))
 
 
 def start_driver(path: Path) -> subprocess.Popen[bytes]:
     here = Path(__file__).parent
     return subprocess.Popen(
-        [sys.executable, str(here / "kill_driver.py"), str(path), "2"],
+        [sys.executable, str(here / "kill_driver.py"), str(path)],
         env=os.environ | {"PYTHONPATH": f"{here}{os.pathsep}{Path.cwd()}"},
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
 
 
-def test_twenty_kills_of_the_driver_lose_nothing(tmp_path: Path, undisturbed: str) -> None:
-    rng = np.random.default_rng(1)
+def kept(path: Path) -> int:
+    held = ResultsFolder(path).done()
+    return 0 if held is None else len(held)
+
+
+def test_a_driver_that_is_killed_midway_loses_nothing(tmp_path: Path, undisturbed: str) -> None:
     path = tmp_path / "study"
+    driver = start_driver(path)
+    while not kept(path) and driver.poll() is None:
+        time.sleep(0.02)
+    driver.kill()
+    driver.wait()
+    assert 0 < kept(path) < kill_driver.N
+    assert digest(kill_driver.complete(path)) == undisturbed
+
+
+@pytest.mark.slow
+def test_twenty_kills_of_the_driver_lose_nothing(tmp_path: Path, undisturbed: str) -> None:
+    rng, path, grown = generator(1), tmp_path / "study", []
     start = time.monotonic()
     assert start_driver(tmp_path / "whole").wait() == 0
     whole = time.monotonic() - start
-    grown = []
     for _ in range(20):
         driver = start_driver(path)
         time.sleep(whole * float(rng.uniform(0.1, 1.0)))
         driver.kill()
         driver.wait()
-        held = ResultsFolder(path).done()
-        grown.append(0 if held is None else len(held))
+        grown.append(kept(path))
     assert grown == sorted(grown)
     assert max(grown) > 0
-    assert digest(complete(path)) == undisturbed
+    assert digest(kill_driver.complete(path)) == undisturbed
 
 
-def test_ten_kills_of_a_worker_lose_nothing(tmp_path: Path, undisturbed: str) -> None:
-    rng, kills = np.random.default_rng(2), []
-    over = threading.Event()
+@pytest.mark.parametrize("count", [1, pytest.param(10, marks=pytest.mark.slow)])
+def test_kills_of_a_worker_lose_nothing(tmp_path: Path, undisturbed: str, count: int) -> None:
+    rng, kills, over = generator(2), [], threading.Event()
 
     def kill_now_and_then() -> None:
-        while len(kills) < 10 and not over.is_set():
+        while len(kills) < count and not over.is_set():
             time.sleep(float(rng.uniform(0.05, 0.6)))
             workers = [
                 child for child in psutil.Process().children()
@@ -172,13 +176,11 @@ def test_ten_kills_of_a_worker_lose_nothing(tmp_path: Path, undisturbed: str) ->
     killer = threading.Thread(target=kill_now_and_then)
     killer.start()
     try:
-        found = complete(tmp_path / "study")
-        while len(kills) < 10:
-            # The study was over before the tenth kill: once more from half of it.
-            half = ResultsFolder(tmp_path / f"again{len(kills)}")
-            half.add_part(found.iloc[:40])
-            assert digest(complete(half.path)) == undisturbed
+        # A study may be over before its last kill: then once more.
+        while len(kills) < count:
+            path = tmp_path / f"study{len(kills)}"
+            found = kill_driver.complete(path, 2, kill_driver.SLOWNESS)
+            assert digest(found) == undisturbed
     finally:
         over.set()
         killer.join()
-    assert digest(found) == undisturbed

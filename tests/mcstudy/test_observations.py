@@ -25,9 +25,6 @@ def of(rows: pd.DataFrame, stimulus: str = "hic15", level: int = 3) -> Observati
     return observations_of(rows, stimulus, level, "cases.csv")
 
 
-# -- observe ---------------------------------------------------------------------------------
-
-
 def test_injured_cases_are_left_censored_uninjured_right_censored_and_exact_ones_points() -> None:
     found = observe(X, HURT)
     assert_array_equal(found.low, [100.0, 0.0, 300.0, 0.0])
@@ -43,9 +40,7 @@ def test_injured_cases_are_left_censored_uninjured_right_censored_and_exact_ones
     one_less = exact.without(1)
     assert one_less.size == 3
     assert_array_equal(one_less.stimulus, [100.0, 300.0, 400.0])
-
-
-def test_the_stimulus_of_an_interval_is_its_middle() -> None:
+    # Of an interval it is the middle.
     held = Observations(np.array([100.0, 0.0, 50.0]), np.array([300.0, 80.0, OPEN]))
     assert_array_equal(held.stimulus, [200.0, 80.0, 50.0])
     assert_array_equal(held.injured, [True, True, False])
@@ -56,9 +51,6 @@ def test_a_stimulus_that_is_no_positive_number_is_refused(bad: float) -> None:
     for injured, exact in ((False, False), (True, False), (True, True)):
         with pytest.raises(ValueError, match="case 5: the stimulus must be a positive number"):
             observe(np.append(X, bad), np.append(HURT, injured), np.append(NO, exact))
-
-
-# -- check -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("low", "high", "message"), [
@@ -96,16 +88,11 @@ def test_cases_that_overlap_by_one_pair_are_enough() -> None:
     (0.0, "case 3: the weight must be a positive number, given 0"), (np.nan, "case 3: the weight"),
     (1.1e9, "the weights go from 1 to 1.1e[+]09: a row may not stand for"),
 ])  # fmt: skip
-def test_weights_that_are_none_or_hopelessly_unequal_are_refused(
-    weight: float, message: str
-) -> None:
+def test_weights_that_are_none_or_too_unequal_are_refused(weight: float, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         observe(X, HURT, weight=np.array([1.0, 1.0, weight, 1.0]))
     assert observe(X, HURT, weight=np.array([1.0, 1.0, 1e9, 1.0])).counted
     assert not observe(X, HURT, weight=np.array([1.0, 1.0, 1.5, 1.0])).counted
-
-
-# -- tables of cases -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("flags", [
@@ -170,9 +157,6 @@ def test_weights_come_from_a_column_of_the_table() -> None:
 def test_wrong_tables_are_the_users_and_name_the_place(rows: pd.DataFrame, message: str) -> None:
     with pytest.raises(UserError, match=message):
         of(rows)
-
-
-# -- files -----------------------------------------------------------------------------------
 
 
 def test_csv_and_parquet_are_read_alike(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The progress line: what it says on a terminal, and that it says nothing elsewhere."""
+"""The lines for long work: what they say on a terminal, and that they say nothing elsewhere."""
 
 import io
 import re
@@ -6,15 +6,13 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
+from mcstudy_tools import Terminal
 
-from mcstudy.execution.progress import Progress
+from mcstudy.execution.progress import Progress, follow
 
-
-class Terminal(io.StringIO):
-    """A text stream that says it is a terminal."""
-
-    def isatty(self) -> bool:
-        return True
+nobody_looks = pytest.mark.parametrize(
+    ("stream", "quiet"), [(io.StringIO(), False), (Terminal(), True)]
+)
 
 
 def arrived(**counts: int) -> pd.DataFrame:
@@ -32,7 +30,7 @@ def session(progress: Progress, done: int = 0) -> None:
     progress.finish()
 
 
-def test_the_line_counts_on_a_terminal() -> None:
+def test_the_line_counts_on_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     stream = Terminal()
     progress = Progress(complete=frozenset({"ok", "no_head_contact"}), stream=stream)
     session(progress)
@@ -43,17 +41,17 @@ def test_the_line_counts_on_a_terminal() -> None:
     assert second.startswith("100/100 done, 2 failed, ")
     assert re.search(r"\d+\.\d runs/s, 0 s left *\n$", second)
     assert progress.failed == 2
+    # Standard output stays clean.
+    session(Progress())
+    assert capsys.readouterr().out == ""
 
 
-def test_a_resumed_session_says_what_is_there_already() -> None:
+def test_a_resumed_session_says_what_is_there_already_and_nothing_of_one_that_is_done() -> None:
     stream = Terminal()
     session(Progress(stream=stream), done=30)
     assert "100 runs, 30 already done" in stream.getvalue()
     assert "\r\x1b[K50/100 done, 3 failed" in stream.getvalue()
     assert "\r\x1b[K100/100 done, 3 failed" in stream.getvalue()
-
-
-def test_nothing_is_said_of_a_study_that_is_done() -> None:
     stream = Terminal()
     progress = Progress(stream=stream)
     progress.start(total=100, done=100)
@@ -61,39 +59,44 @@ def test_nothing_is_said_of_a_study_that_is_done() -> None:
     assert stream.getvalue() == ""
 
 
-@pytest.mark.parametrize(("stream", "quiet"), [(io.StringIO(), False), (Terminal(), True)])
-def test_silent_without_a_terminal_or_when_quiet(stream: io.StringIO, quiet: bool) -> None:
+@nobody_looks
+def test_silent_where_nobody_looks(stream: io.StringIO, quiet: bool) -> None:
     progress = Progress(quiet=quiet, stream=stream)
     session(progress)
-    assert stream.getvalue() == ""
     assert progress.failed == 3
+    assert list(follow([3, 1, 2], "runs", quiet=quiet, stream=stream)) == [3, 1, 2]
+    assert stream.getvalue() == ""
 
 
-def test_standard_output_stays_clean(capsys: pytest.CaptureFixture[str]) -> None:
-    session(Progress())
-    assert capsys.readouterr().out == ""
-
-
+@pytest.mark.filterwarnings("error")
 def test_the_widest_interval_is_that_of_the_mean_known_worst() -> None:
-    stream = Terminal()
+    stream, sizes = Terminal(), (3, 60, 37)
     progress = Progress(stream=stream, watched=("hic15", "wad"))
     progress.start(total=200, done=0)
-    assert progress.widest is None
-    for size in (3, 60, 37):
+    for size in sizes:
+        # Of fewer than ten values nothing is said.
+        assert (progress.widest is None) == (size != 37)
         progress.advance(arrived(ok=size))
-    values = np.concatenate([arrived(ok=size)["hic15"] for size in (3, 60, 37)])
+    values = np.concatenate([arrived(ok=size)["hic15"] for size in sizes])
     reach = 1.96 * values.std(ddof=1) / np.sqrt(values.size) / values.mean()
     # Of wad no run has a value: nothing is said of it.
     assert progress.widest == ("hic15", pytest.approx(reach, rel=1e-12))
     assert f"hic15 ± {100.0 * reach:.2g} %" in stream.getvalue()
-
-
-@pytest.mark.filterwarnings("error")
-def test_numbers_too_large_for_their_squares_leave_the_width_unknown() -> None:
-    progress = Progress(watched=("hic15",), stream=Terminal())
-    progress.start(total=40, done=0)
+    # Numbers too large for their squares leave the width unknown.
     for size in (1e250, -1e250):
-        frame = arrived(ok=20)
-        frame["hic15"] *= size
-        progress.advance(frame)
+        progress.advance(arrived(ok=20).assign(hic15=size))
     assert progress.widest is None
+
+
+def test_a_list_is_followed_by_counts_and_names() -> None:
+    stream = Terminal()
+    work = follow(["A", "B"], "tests fitted", stream=stream)
+    seen = [(item, stream.getvalue().rsplit("\x1b[K")[-1]) for item in work]
+    assert seen == [("A", "0/2 tests fitted (A)"), ("B", "1/2 tests fitted (B)")]
+    assert stream.getvalue().endswith("\r\x1b[K2/2 tests fitted\n")
+    assert stream.getvalue().count("\n") == 1
+    # An error in the work comes through.
+    work = follow([1, 2], "runs", stream=Terminal())
+    next(work)
+    with pytest.raises(KeyError):
+        work.throw(KeyError("broken"))

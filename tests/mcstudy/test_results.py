@@ -11,6 +11,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from mcstudy_tools import generator
 
 from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.results import ResultsFolder, check_failures, digest, to_json
@@ -19,18 +20,16 @@ ROOT = Path(__file__).parents[2]
 
 
 def table(n: int = 12) -> pd.DataFrame:
-    rng = np.random.default_rng(0)
-    frame = pd.DataFrame(
-        {
-            "run": np.arange(n),
-            "replicate": np.arange(n) // 4,
-            "impact_speed": rng.random(n),
-            "hic15": rng.normal(1000.0, 300.0, n),
-            "status": ["ok"] * n,
-        }
-    )
+    rng = generator(0)
+    frame = pd.DataFrame({
+        "run": np.arange(n), "replicate": np.arange(n) // 4, "impact_speed": rng.random(n),
+        "hic15": rng.normal(1000.0, 300.0, n), "status": ["ok"] * n,
+    })  # fmt: skip
     frame.loc[3, ["hic15", "status"]] = [np.nan, "no_head_contact"]
     return frame
+
+
+RUNS = table()
 
 
 def files(folder: ResultsFolder) -> set[str]:
@@ -42,58 +41,39 @@ def folder(tmp_path: Path) -> ResultsFolder:
     return ResultsFolder(tmp_path / "study")
 
 
-# -- round trips -----------------------------------------------------------------------------
-
-
 def test_an_untouched_folder_is_not_created(folder: ResultsFolder) -> None:
     assert folder.done() is None
     assert not folder.path.exists()
     with pytest.raises(UserError, match="holds no runs"):
         folder.runs()
+    folder.check_same_study({"seed": "1"})
 
 
 def test_parts_and_the_compacted_table_read_back_to_the_last_bit(folder: ResultsFolder) -> None:
-    runs = table()
     with folder.open_for_writing():
         for start in (8, 0, 4):
-            folder.add_part(runs.iloc[start : start + 4])
-        pd.testing.assert_frame_equal(folder.runs(), runs, check_dtype=False)
-        assert digest(folder.runs()) == digest(runs)
+            folder.add_part(RUNS.iloc[start : start + 4])
+        pd.testing.assert_frame_equal(folder.runs(), RUNS, check_dtype=False)
+        assert digest(folder.runs()) == digest(RUNS)
         folder.compact(folder.runs())
-    pd.testing.assert_frame_equal(folder.runs(), runs, check_dtype=False)
-    assert digest(folder.runs()) == digest(runs)
+    pd.testing.assert_frame_equal(folder.runs(), RUNS, check_dtype=False)
     assert files(folder) == {".lock", "runs.parquet"}
-
-
-def test_runs_that_are_in_the_table_and_in_a_part_count_once(folder: ResultsFolder) -> None:
     # A kill between writing the table and dropping the parts leaves both.
-    runs = table()
-    folder.write_frame("runs.parquet", runs)
-    folder.add_part(runs.iloc[4:8])
-    assert digest(folder.runs()) == digest(runs)
+    folder.add_part(RUNS.iloc[4:8])
+    assert digest(folder.runs()) == digest(RUNS)
 
 
 def test_writing_leaves_no_temporary_files_and_replaces_the_old(folder: ResultsFolder) -> None:
-    for content in ("old", "new, and longer"):
+    for content in ("old", "new, Fußgänger – 10 m/s²"):
         folder.write_text("a/study.toml", content)
         folder.write_json("manifest.json", {"content": content})
-        folder.write_frame("runs.parquet", table())
-    assert files(folder) == {"a/study.toml", "manifest.json", "runs.parquet"}
-    assert (folder.path / "a/study.toml").read_text(encoding="utf-8") == "new, and longer"
-    assert folder.read_json("manifest.json") == {"content": "new, and longer"}
-
-
-def test_a_failed_write_keeps_the_old_file(folder: ResultsFolder) -> None:
-    folder.write_json("manifest.json", {"seed": 1})
+        folder.write_frame("runs.parquet", RUNS)
+    assert (folder.path / "a/study.toml").read_text(encoding="utf-8") == content
+    # A failed write keeps the old file.
     with pytest.raises(TypeError):
         folder.write_json("manifest.json", {"seed": object()})
-    assert folder.read_json("manifest.json") == {"seed": 1}
-    assert files(folder) == {"manifest.json"}
-
-
-def test_text_is_utf8(folder: ResultsFolder) -> None:
-    folder.write_text("study.toml", "Fußgänger – 10 m/s²")
-    assert (folder.path / "study.toml").read_bytes().decode("utf-8") == "Fußgänger – 10 m/s²"
+    assert folder.read_json("manifest.json") == {"content": content}
+    assert files(folder) == {"a/study.toml", "manifest.json", "runs.parquet"}
 
 
 def test_histories_read_back_by_group(folder: ResultsFolder) -> None:
@@ -109,117 +89,80 @@ def test_histories_read_back_by_group(folder: ResultsFolder) -> None:
         folder.history(8)
 
 
-# -- torn files ------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("keep", [0.0, 0.5, 0.99])
-def test_a_torn_part_is_set_aside_and_its_runs_are_missing(
-    folder: ResultsFolder, keep: float
-) -> None:
-    runs = table()
+def test_a_torn_part_is_set_aside_with_its_runs(folder: ResultsFolder, keep: float) -> None:
     for start in (0, 4, 8):
-        folder.add_part(runs.iloc[start : start + 4])
+        folder.add_part(RUNS.iloc[start : start + 4])
     torn = sorted((folder.path / "parts").iterdir())[1]
     content = torn.read_bytes()
     torn.write_bytes(content[: int(keep * len(content))])
-    assert folder.runs()["run"].tolist() == [0, 1, 2, 3, 8, 9, 10, 11]
+    rest = [0, 1, 2, 3, 8, 9, 10, 11]
+    assert folder.runs()["run"].tolist() == rest
     assert torn.exists()
     with folder.open_for_writing():
-        assert folder.runs()["run"].tolist() == [0, 1, 2, 3, 8, 9, 10, 11]
-    assert not torn.exists()
-    assert torn.with_suffix(".broken").exists()
-    folder.add_part(runs.iloc[4:8])
-    assert digest(folder.runs()) == digest(runs)
+        assert folder.runs()["run"].tolist() == rest
+    assert not torn.exists() and torn.with_suffix(".broken").exists()
+    folder.add_part(RUNS.iloc[4:8])
+    assert digest(folder.runs()) == digest(RUNS)
 
 
 def test_a_torn_table_is_set_aside_and_the_parts_still_count(folder: ResultsFolder) -> None:
-    runs = table()
-    folder.add_part(runs.iloc[8:])
+    folder.add_part(RUNS.iloc[8:])
     (folder.path / "runs.parquet").write_bytes(b"PAR1 and then the power went")
     with folder.open_for_writing():
         assert folder.runs()["run"].tolist() == [8, 9, 10, 11]
     assert (folder.path / "runs.broken").exists()
+    part = next((folder.path / "parts").iterdir())
+    part.write_bytes(b"")
+    with pytest.raises(UserError, match="holds no runs"):
+        folder.runs()
 
 
 def test_a_table_with_another_number_than_was_written_is_set_aside(folder: ResultsFolder) -> None:
-    runs = table()
-    folder.add_part(runs)
+    folder.add_part(RUNS)
     part = next((folder.path / "parts").iterdir())
     held = pq.read_table(part)
-    changed = held.set_column(
-        held.column_names.index("hic15"), "hic15", pa.array(np.full(len(runs), 700.0))
-    )
-    pq.write_table(changed, part)
+    wrong = pa.array(np.full(len(RUNS), 700.0))
+    pq.write_table(held.set_column(held.column_names.index("hic15"), "hic15", wrong), part)
     assert folder.done() is None
-
-
-def test_a_folder_of_torn_files_only_holds_no_runs(folder: ResultsFolder) -> None:
-    (folder.path / "parts").mkdir(parents=True)
-    (folder.path / "parts" / "part-000000000-000004.parquet").write_bytes(b"")
-    with pytest.raises(UserError, match="holds no runs"):
-        folder.runs()
 
 
 def test_a_part_that_the_writer_compacts_away_meanwhile_is_no_crash(
     folder: ResultsFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import pyarrow.parquet as pq
-
-    runs = table()
-    folder.add_part(runs)
+    folder.add_part(RUNS)
     read = pq.read_table
 
     def compact_first(file: Path) -> object:
         monkeypatch.setattr(pq, "read_table", read)
-        folder.compact(runs)
+        folder.compact(RUNS)
         return read(file)
 
     monkeypatch.setattr(pq, "read_table", compact_first)
-    assert digest(folder.runs()) == digest(runs)
+    assert digest(folder.runs()) == digest(RUNS)
 
 
-# -- digest ----------------------------------------------------------------------------------
-
-
-def test_digest_does_not_depend_on_the_order_of_rows() -> None:
-    runs = table()
-    assert digest(runs.sample(frac=1.0, random_state=1)) == digest(runs)
-    assert digest(runs.iloc[::-1].reset_index(drop=True)) == digest(runs)
-
-
-@pytest.mark.parametrize("sizes", [(12,), (1, 11), (4, 4, 4), (5, 7), (1,) * 12])
-def test_digest_does_not_depend_on_the_layout_of_parts(
+@pytest.mark.parametrize("sizes", [(12,), (1, 11), (4, 4, 4), (1,) * 12])
+def test_digest_depends_neither_on_the_order_of_rows_nor_on_the_layout_of_parts(
     folder: ResultsFolder, sizes: tuple[int, ...]
 ) -> None:
-    runs, start = table(), 0
-    for size in sizes:
-        folder.add_part(runs.iloc[start : start + size])
-        start += size
-    assert digest(folder.runs()) == digest(runs)
+    assert digest(RUNS.sample(frac=1.0, random_state=1)) == digest(RUNS)
+    ends = np.cumsum(sizes)
+    for size, end in zip(sizes, ends, strict=True):
+        folder.add_part(RUNS.iloc[end - size : end])
+    assert digest(folder.runs()) == digest(RUNS)
 
 
-@pytest.mark.parametrize(
-    ("column", "value"),
-    [
-        ("hic15", np.nextafter(table()["hic15"][5], np.inf)),
-        ("hic15", np.nan),
-        ("impact_speed", 0.0),
-        ("replicate", 9),
-        ("status", "unstable"),
-    ],
-)
+@pytest.mark.parametrize(("column", "value"), [
+    ("hic15", np.nextafter(RUNS["hic15"][5], np.inf)), ("hic15", np.nan), ("impact_speed", 0.0),
+    ("replicate", 9), ("status", "unstable"),
+])  # fmt: skip
 def test_digest_changes_with_any_number(column: str, value: float | str) -> None:
     runs = table()
     runs.loc[5, column] = value
-    assert digest(runs) != digest(table())
+    assert digest(runs) != digest(RUNS)
+    assert digest(RUNS.rename(columns={column: "other"})) != digest(RUNS) != digest(table(11))
 
-
-def test_digest_changes_with_names_and_with_the_number_of_runs() -> None:
-    assert digest(table().rename(columns={"hic15": "hic36"})) != digest(table())
-    assert digest(table(11)) != digest(table(12))
-
-
-# -- lock ------------------------------------------------------------------------------------
 
 HOLD = """
 import sys
@@ -240,11 +183,7 @@ def test_a_second_writer_is_refused_until_the_first_is_done(folder: ResultsFolde
         with pytest.raises(UserError, match="another run writes into this folder"):
             folder.open_for_writing().__enter__()
         holder.communicate("")
-    with folder.open_for_writing():
-        pass
-
-
-def test_the_lock_holds_within_one_process_and_goes_with_an_error(folder: ResultsFolder) -> None:
+    # The lock holds within one process as well, and goes with an error.
     with folder.open_for_writing():  # noqa: SIM117
         with pytest.raises(UserError, match="another run"):
             ResultsFolder(folder.path).open_for_writing().__enter__()
@@ -261,13 +200,6 @@ def test_a_folder_that_cannot_be_created_is_a_user_error(tmp_path: Path) -> None
             ResultsFolder(path).open_for_writing().__enter__()
 
 
-# -- the same study --------------------------------------------------------------------------
-
-
-def test_a_folder_without_manifest_takes_any_study(folder: ResultsFolder) -> None:
-    folder.check_same_study({"seed": "1"})
-
-
 def test_another_study_is_refused_by_what_differs(folder: ResultsFolder) -> None:
     numbers = {"seed": "1", "model": '"toy"', "inputs.stature": "{}"}
     folder.write_json("manifest.json", {"numbers": numbers})
@@ -280,8 +212,7 @@ def test_another_study_is_refused_by_what_differs(folder: ResultsFolder) -> None
     ):
         with pytest.raises(UserError) as caught:
             folder.check_same_study(topics)
-        assert named in str(caught.value)
-        assert str(folder.path) in str(caught.value)
+        assert named in str(caught.value) and str(folder.path) in str(caught.value)
 
 
 @pytest.mark.parametrize("content", ["", "{", "[1, 2]", "\x00"])
@@ -295,11 +226,8 @@ def test_json_that_is_none_is_a_user_error(folder: ResultsFolder, content: str) 
         folder.read_json("missing.json")
 
 
-# -- JSON ------------------------------------------------------------------------------------
-
-
-def test_json_has_plain_numbers_and_null_for_what_is_none() -> None:
-    content = {
+def test_json_has_plain_numbers_and_null_for_what_is_none(folder: ResultsFolder) -> None:
+    text = to_json({
         "nan": math.nan,
         "inf": [math.inf, -np.inf],
         "array": np.array([[1.0, np.nan], [2.5, 3.0]]),
@@ -307,8 +235,7 @@ def test_json_has_plain_numbers_and_null_for_what_is_none() -> None:
         "text": "Fußgänger",
         "none": None,
         3: {"nested": np.float64(np.nan)},
-    }
-    text = to_json(content)
+    })  # fmt: skip
     assert json.loads(text) == {
         "nan": None,
         "inf": [None, None],
@@ -320,24 +247,15 @@ def test_json_has_plain_numbers_and_null_for_what_is_none() -> None:
     }
     assert "NaN" not in text
     assert text.endswith("}\n")
-
-
-def test_json_keeps_every_bit_of_a_number(folder: ResultsFolder) -> None:
-    values = np.random.default_rng(3).normal(size=50).tolist()
+    values = generator(3).normal(size=50).tolist()
     folder.write_json("analysis.json", {"values": values})
     assert folder.read_json("analysis.json")["values"] == values
 
 
-# -- failures --------------------------------------------------------------------------------
-
-
-def test_failures_up_to_the_limit_are_accepted() -> None:
+def test_failures_above_the_limit_fail_the_study_and_are_counted() -> None:
     check_failures({"ok": 98, "unstable": 2}, {"unstable"}, 0.02)
     check_failures({"ok": 50, "no_head_contact": 50}, set(), 0.0)
     check_failures({}, set(), 0.0)
-
-
-def test_failures_above_the_limit_fail_the_study_and_are_counted() -> None:
     counts = {"ok": 960, "unstable": 25, "step_limit": 5, "no_head_contact": 10}
     with pytest.raises(StudyError) as caught:
         check_failures(counts, {"unstable", "step_limit"}, 0.02)

@@ -28,8 +28,6 @@ INPUTS = tuple(f"x{k}" for k in range(8))
 THREE = INPUTS[:3]
 UPPER = np.triu(np.ones((3, 3), dtype=bool), k=1)
 
-# -- functions with known indices ------------------------------------------------------------
-
 G_WEIGHTS = np.array([0.0, 1.0, 4.5, 9.0, 99.0, 99.0, 99.0, 99.0])
 SLOPES = np.array([1.0, 2.0, 3.0, 0.5, 0.0, 1.5, 2.5, 0.1])
 
@@ -140,9 +138,6 @@ def check_equal(a: Indices, b: Indices, tolerance: float = 0.0) -> None:
     assert a.blocks == b.blocks
 
 
-# -- closed forms and coverage ---------------------------------------------------------------
-
-
 @pytest.mark.parametrize("seeds", SEEDS)
 def test_indices_are_right_on_average_and_their_intervals_cover(seeds: int) -> None:
     # The mean over seeds scatters by sd / sqrt(seeds); a ratio of means over n = 256 base points
@@ -188,22 +183,6 @@ def test_intervals_of_independent_base_points_cover(seeds: int) -> None:
     check_coverage(np.stack(tables), known_indices()[:, :3, 0])
 
 
-def test_points_of_a_scramble_taken_as_independent_give_intervals_far_too_wide() -> None:
-    # Of a sum of uniforms; 64 points of a scramble are already spread so well that the indices
-    # scatter several times less than those of independent points (A. Owen, Annals of Statistics
-    # 25, 1997: variance of order n^-3 for smooth functions instead of n^-1).
-    drawn = draw_saltelli(THREE, {}, 1024, 0)
-    outputs = drawn.uniforms @ np.array([1.0, 2.0, 3.0])
-    blocks = split_blocks(outputs[:, None], 4, second_order=False)
-    narrow = estimate_indices(blocks, drawn.scramble[:: drawn.block], resamples=200)
-    wide = estimate_indices(blocks, resamples=200)
-    for one, other in ((wide.first, narrow.first), (wide.total, narrow.total)):
-        assert np.mean((one[2] - one[1])[:3] / (other[2] - other[1])[:3]) > 2.0
-
-
-# -- SALib and SciPy -------------------------------------------------------------------------
-
-
 def design_outputs(*, second_order: bool) -> Blocks:
     """Return blocks of three outputs of one design of three inputs and the dummy."""
     u = draw_saltelli(THREE, {}, 128, 11, second_order=second_order).uniforms
@@ -243,14 +222,6 @@ def test_values_equal_salibs_and_scipys_on_equal_samples(blocks: Blocks) -> None
     assert_allclose(found.total[0].T, values.total_order, rtol=0, atol=1e-10)
 
 
-def test_the_two_centres_differ_by_less_than_the_interval() -> None:
-    blocks = design_outputs(second_order=True)
-    a, b = (estimate_indices(blocks, centre=centre, resamples=200) for centre in ("all", "base"))
-    assert not np.array_equal(a.first[0], b.first[0])
-    assert np.all(np.abs(a.first[0] - b.first[0]) <= a.first[2] - a.first[0] + 1e-12)
-    assert_allclose(a.total[0], b.total[0], rtol=1e-12)
-
-
 def test_intervals_are_as_wide_as_salibs_bootstrap() -> None:
     # SALib: 1.96 standard deviations of resamples of points. Ours: t instead of z and the factor
     # sqrt(n / (n - 1)), both within 1 % for 128 points. 4,000 resamples scatter by about 1 %.
@@ -258,9 +229,6 @@ def test_intervals_are_as_wide_as_salibs_bootstrap() -> None:
     found, theirs = estimate_indices(blocks, resamples=4000), salibs(blocks, 0, 4000)
     for table, key in ((found.first, "S1_conf"), (found.total, "ST_conf")):
         assert_allclose((table[2] - table[0])[:3, 0], theirs[key][:3], rtol=0.08)
-
-
-# -- what does not change an index -----------------------------------------------------------
 
 
 @quiet(40)
@@ -300,17 +268,6 @@ def test_the_sum_of_first_order_indices_has_an_interval_of_its_own() -> None:
     # Not the sum of the intervals: the indices of one sample go together.
     half = found.first_sum[2] - found.first_sum[0]
     assert np.all((half > 0.0) & (half < (found.first[2] - found.first[0]).sum(axis=0)))
-
-
-def test_an_output_has_the_same_indices_alone_and_among_others() -> None:
-    blocks = random_blocks(1, m=5)
-    alone = estimate_indices(mapped(blocks, lambda part: part[..., 2:3]), resamples=50)
-    among = estimate_indices(blocks, resamples=50)
-    assert_allclose(alone.first[..., 0], among.first[..., 2], rtol=1e-10)
-    assert_allclose(alone.total[..., 0], among.total[..., 2], rtol=1e-10)
-
-
-# -- seeds, replicates, layout ---------------------------------------------------------------
 
 
 def test_intervals_are_reproducible_and_leave_the_global_generator_alone() -> None:
@@ -374,9 +331,6 @@ def test_rows_are_split_in_the_order_of_the_design(second_order: bool) -> None:
         assert_array_equal(blocks.BA[:, 2, 0], starts + d + 3)
 
 
-# -- what is refused and what has no index ---------------------------------------------------
-
-
 @pytest.mark.parametrize("shape", [(0, 1), (7, 1), (9, 2), (10,), (5, 2, 1)])
 def test_rows_that_are_no_blocks_are_refused(shape: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match="shape"):
@@ -396,7 +350,7 @@ def test_values_that_are_not_finite_and_single_base_points_are_refused(place: st
 
 @pytest.mark.parametrize("n", [2, 16, 100, 1000])
 @pytest.mark.parametrize("constant", [0.0, -0.5, 0.1, 1.0 / 3.0, 1e9 + 0.1, -7.3e-5])
-def test_a_constant_output_has_no_indices_whether_its_mean_rounds_or_not(
+def test_a_constant_output_has_no_indices_if_its_mean_rounds_or_not(
     constant: float, n: int
 ) -> None:
     blocks = random_blocks(2, n=n, m=1)

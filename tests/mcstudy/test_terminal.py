@@ -13,31 +13,31 @@ from studies import terminal
 HOSTILE = "[bold]a[/bold] :smile: * ** [link=x]y[/] \\[z]"
 
 
-def printed(capsys: pytest.CaptureFixture[str]) -> str:
-    return capsys.readouterr().out
-
-
 @pytest.mark.parametrize("text", [HOSTILE, "1:2:3", "[", "]", "[/]", "a" * 500])
 def test_nothing_in_a_text_is_markup(capsys: pytest.CaptureFixture[str], text: str) -> None:
     terminal.print_lines([text])
     terminal.print_path("report", Path("/tmp") / text.replace("/", "-"))
     terminal.print_table(text, [text], [[text]])
-    out = printed(capsys)
-    assert out.count(text) == 5 - ("/" in text)
+    assert capsys.readouterr().out.count(text) == 5 - ("/" in text)
 
 
 def test_nothing_is_cut_where_the_output_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     row = [f"a_name_that_is_as_long_as_names_of_inputs_are_{k}" for k in range(8)]
     terminal.print_table("", [f"head {k}" for k in range(8)], [row])
-    out = printed(capsys)
+    out = capsys.readouterr().out
     assert all(name in out for name in row)
     assert "\N{HORIZONTAL ELLIPSIS}" not in out
 
 
 def test_characters_that_steer_a_terminal_are_replaced(capsys: pytest.CaptureFixture[str]) -> None:
     terminal.print_lines(["a\x1b[31mb\x07\x9bc"])
-    assert printed(capsys) == "a\ufffd[31mb\ufffd\ufffdc\n"
+    assert capsys.readouterr().out == "a\ufffd[31mb\ufffd\ufffdc\n"
     assert str(UserError("x\x1b[2J\ny")) == "x\ufffd[2J y"
+
+
+# -- processes of their own, which take seconds to start -------------------------------------
+
+C_LOCALE = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
 
 
 def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[bytes]:
@@ -49,7 +49,7 @@ def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[byte
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("encoding", ["cp437", "cp932"])
+@pytest.mark.parametrize("encoding", ["cp437", pytest.param("cp932", marks=pytest.mark.slow)])
 def test_any_encoding_of_the_terminal(encoding: str) -> None:
     done = run("models", "headform", PYTHONIOENCODING=encoding)
     assert done.returncode == 0, done.stderr
@@ -57,10 +57,13 @@ def test_any_encoding_of_the_terminal(encoding: str) -> None:
     assert "impact_speed" in done.stdout.decode(encoding)
 
 
-def test_the_c_locale_and_errors_in_it() -> None:
-    plain = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
-    assert run("effects", **plain).returncode == 0
-    done = run("run", "gibt-es-nicht-\u00e4\u20ac.toml", **plain)
+def test_errors_in_the_c_locale() -> None:
+    done = run("run", "gibt-es-nicht-\u00e4\u20ac.toml", **C_LOCALE)
     assert done.returncode == 2
     assert done.stderr.startswith(b"mcstudy: ")
     assert b"Traceback" not in done.stderr
+
+
+@pytest.mark.slow
+def test_the_c_locale() -> None:
+    assert run("effects", **C_LOCALE).returncode == 0

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mcstudy_tools import Array, Flags, quiet
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy import optimize, stats
+from scipy import stats
 
-from mcstudy.injury.observations import Observations, observe
+from mcstudy.injury.observations import Observations
 from mcstudy.injury.turnbull import StepRisk, estimate_steps
 
 # Breast retraction after radiotherapy alone, months (D. Finkelstein, R. Wolfe, Biometrics 41, 1985;
@@ -58,9 +58,6 @@ def membership(observations: Observations, steps: StepRisk) -> Flags:
     return np.where(observations.exact[:, None], point & (inner == high), holds)
 
 
-# -- left- and right-censored: isotonic regression -------------------------------------------
-
-
 def max_min(x: Array, injured: Array) -> tuple[Array, Array]:
     """Return distinct stimuli and the isotonic regression of injury, by the max-min formula.
 
@@ -83,9 +80,7 @@ def max_min(x: Array, injured: Array) -> tuple[Array, Array]:
 @given(
     cases=st.lists(st.tuples(st.integers(1, 12), st.booleans()), min_size=2, max_size=30),
 )
-def test_left_and_right_censored_cases_give_isotonic_regression(
-    cases: list[tuple[int, bool]],
-) -> None:
+def test_cases_censored_on_one_side_give_isotonic_regression(cases: list[tuple[int, bool]]) -> None:
     # Also with ties, with one class alone and with complete separation.
     x = np.array([float(place) for place, _ in cases])
     injured = np.array([hurt for _, hurt in cases])
@@ -96,19 +91,6 @@ def test_left_and_right_censored_cases_give_isotonic_regression(
     assert np.all(steps.share > 0.0)
     assert np.all(steps.low < steps.high)
     assert np.all(steps.low[1:] >= steps.high[:-1])
-
-
-def test_many_distinct_cases_equal_scipys_isotonic_regression() -> None:
-    rng = np.random.default_rng(2)
-    x = rng.random(400)
-    injured = rng.random(400) < x
-    order = np.argsort(x)
-    expected = optimize.isotonic_regression(injured[order].astype(float)).x
-    steps = estimate_steps(observe(x, injured))
-    assert_allclose(value_at(steps, x[order]), expected, atol=1e-12)
-
-
-# -- by hand ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("low", "high", "expected"), [
@@ -139,9 +121,6 @@ def test_exact_and_right_censored_cases_give_kaplan_and_meiers_curve() -> None:
     steps = estimate_steps(of(x, np.where(seen, x, np.inf)))
     theirs = stats.ecdf(stats.CensoredData(uncensored=x[seen], right=x[~seen])).cdf
     assert_allclose(value_at(steps, theirs.quantiles), theirs.probabilities, atol=1e-6)
-
-
-# -- intervals -------------------------------------------------------------------------------
 
 
 def test_the_textbook_example_of_interval_censored_cases() -> None:
@@ -211,9 +190,6 @@ def test_shares_are_self_consistent_and_of_greatest_likelihood(seed: int, n: int
     other = estimate_steps(Observations(observations.low[order], observations.high[order]))
     assert_array_equal(other.low, steps.low)
     assert_allclose(other.share, steps.share, atol=1e-7)
-
-
-# -- the drawn steps -------------------------------------------------------------------------
 
 
 def test_the_drawn_curve_rises_at_the_end_of_each_interval() -> None:

@@ -4,6 +4,7 @@ import os
 import re
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import TypedDict
 
 import numpy as np
@@ -13,15 +14,14 @@ Array = NDArray[np.float64]
 Started = Callable[[int], None]
 Found = tuple[Array, list[str]]
 
-
-def ignore(_row: int) -> None:
-    """Tell nobody which row begins."""
-
-
 NAMES = ("x", "y")
 OUTPUTS = ("total", "product")
 UNSOLVED = 0.9
 """Rows whose x lies above end with a status of their own and without a product."""
+
+
+def ignore(_row: int) -> None:
+    """Tell nobody which row begins."""
 
 
 class Fault(TypedDict):
@@ -52,6 +52,14 @@ def _is_faulty(fault: Fault, rows: Array) -> bool:
 def evaluate_and_die(fault: Fault, rows: Array, started: Started = ignore) -> Found:
     """End the process at one row, without a word."""
     if _is_faulty(fault, rows):
+        os._exit(1)
+    return evaluate_slowly(0.002, rows)
+
+
+def evaluate_and_die_once(mark: Path, rows: Array, started: Started = ignore) -> Found:
+    """End the process at the first row, the first time."""
+    if not mark.exists():
+        mark.touch()
         os._exit(1)
     return evaluate_slowly(0.002, rows)
 

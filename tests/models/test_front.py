@@ -1,0 +1,72 @@
+"""The car's front as a seam: a geometry that the product does not have answers as zones do."""
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from models.compilation import inlined_kernel
+from models.crash.first_contact import first_contact_shift
+from models.crash.front import FRONTS
+from models.crash.surfaces import empty_contacts, shape_of
+from models.multibody.model import MultibodyModel
+from models.multibody.setup import build_crash
+from models.pedestrian.anthropometry import SEGMENTS
+from models.vehicle.zones import Zones
+
+LEAN = 0.3
+"""rad by which the wall leans back."""
+
+
+class Wall(NamedTuple):
+    """A plane through a point (m) of the car's frame with a normal, without borders."""
+
+    point: NDArray[np.float64]
+    normal: NDArray[np.float64]
+
+
+@inlined_kernel
+def one(wall):  # type: ignore[no-untyped-def]
+    return 1
+
+
+@inlined_kernel
+def separation(wall, ellipsoids, contacts, patch, i, cx, cy, cz, cosine, sine):  # type: ignore[no-untyped-def]
+    n = wall.normal
+    A = shape_of(contacts, i)
+    ax = A[0] * n[0] + A[1] * n[1] + A[2] * n[2]
+    ay = A[1] * n[0] + A[3] * n[1] + A[4] * n[2]
+    az = A[2] * n[0] + A[4] * n[1] + A[5] * n[2]
+    h = math.sqrt(ax * n[0] + ay * n[1] + az * n[2])
+    away = (cx - wall.point[0]) * n[0] + (cy - wall.point[1]) * n[1] + (cz - wall.point[2]) * n[2]
+    px, py, pz = cx - ax / h, cy - ay / h, cz - az / h
+    return away - h, n[0], n[1], n[2], px, py, pz, 1.0, 0
+
+
+@pytest.fixture
+def wall() -> Iterator[Wall]:
+    zones = FRONTS[Zones]
+    FRONTS[Wall] = zones._replace(patch_count=one, separation_of=separation)
+    yield Wall(np.array([0.0, 0.0, 0.0]), np.array([math.cos(LEAN), 0.0, math.sin(LEAN)]))
+    del FRONTS[Wall]
+
+
+def test_a_body_is_placed_where_it_just_touches_another_geometry(wall: Wall) -> None:
+    model = MultibodyModel()
+    crash = build_crash({item.name: item.nominal for item in model.inputs}, model.vehicle)
+    assert crash is not None
+    ellipsoids = crash.scenario.ellipsoids
+    contacts = empty_contacts(len(SEGMENTS), 1, len(ellipsoids.pairs))
+    rng = np.random.default_rng(3)
+    contacts.centre[:] = rng.normal([0.0, 0.0, 1.0], 0.2, contacts.centre.shape)
+    axes = np.sqrt(ellipsoids.square)
+    for i, (a, b, c) in enumerate(axes**2):
+        contacts.shape[i] = [a, 0.0, 0.0, b, 0.0, c]
+    # The plane of closed form: the nearest support of all ellipsoids along the normal.
+    support = np.sqrt((axes**2 * wall.normal**2).sum(axis=1))
+    nearest = float((contacts.centre @ wall.normal - support).min())
+    found = first_contact_shift(wall, ellipsoids, contacts)
+    assert found == pytest.approx(-nearest / wall.normal[0], abs=1e-9)

@@ -4,13 +4,13 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
+import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from models.compilation import inlined_kernel
-from models.crash.first_contact import first_contact_shift
-from models.crash.front import FRONTS
+from models.crash.front import FRONTS, patch_count, separation_of
 from models.crash.surfaces import empty_contacts, shape_of
 from models.multibody.model import MultibodyModel
 from models.multibody.setup import build_crash
@@ -34,7 +34,7 @@ def one(wall):  # type: ignore[no-untyped-def]
 
 
 @inlined_kernel
-def separation(wall, ellipsoids, contacts, patch, i, cx, cy, cz, cosine, sine):  # type: ignore[no-untyped-def]
+def wall_separation(wall, ellipsoids, contacts, patch, i, cx, cy, cz, cosine, sine):  # type: ignore[no-untyped-def]
     n = wall.normal
     A = shape_of(contacts, i)
     ax = A[0] * n[0] + A[1] * n[1] + A[2] * n[2]
@@ -49,12 +49,25 @@ def separation(wall, ellipsoids, contacts, patch, i, cx, cy, cz, cosine, sine): 
 @pytest.fixture
 def wall() -> Iterator[Wall]:
     zones = FRONTS[Zones]
-    FRONTS[Wall] = zones._replace(patch_count=one, separation_of=separation)
+    FRONTS[Wall] = zones._replace(patch_count=one, separation_of=wall_separation)
     yield Wall(np.array([0.0, 0.0, 0.0]), np.array([math.cos(LEAN), 0.0, math.sin(LEAN)]))
     del FRONTS[Wall]
 
 
-def test_a_body_is_placed_where_it_just_touches_another_geometry(wall: Wall) -> None:
+@numba.njit
+def nearest(front, ellipsoids, contacts):  # type: ignore[no-untyped-def]
+    """Return the segment that is nearest to a front, and the nine answers of the front."""
+    best, found = -1, separation_of(front, ellipsoids, contacts, 0, 0, 9.0, 9.0, 9.0, 1.0, 0.0)
+    for i in range(contacts.centre.shape[0]):
+        x, y, z = contacts.centre[i]
+        for patch in range(patch_count(front)):
+            answer = separation_of(front, ellipsoids, contacts, patch, i, x, y, z, 1.0, 0.0)
+            if answer[0] < found[0]:
+                best, found = i, answer
+    return best, found
+
+
+def test_a_geometry_of_ones_own_answers_where_the_body_is_nearest(wall: Wall) -> None:
     model = MultibodyModel()
     crash = build_crash({item.name: item.nominal for item in model.inputs}, model.vehicle)
     assert crash is not None
@@ -62,11 +75,16 @@ def test_a_body_is_placed_where_it_just_touches_another_geometry(wall: Wall) -> 
     contacts = empty_contacts(len(SEGMENTS), 1, len(ellipsoids.pairs))
     rng = np.random.default_rng(3)
     contacts.centre[:] = rng.normal([0.0, 0.0, 1.0], 0.2, contacts.centre.shape)
-    axes = np.sqrt(ellipsoids.square)
-    for i, (a, b, c) in enumerate(axes**2):
+    squares = ellipsoids.square
+    for i, (a, b, c) in enumerate(squares):
         contacts.shape[i] = [a, 0.0, 0.0, b, 0.0, c]
-    # The plane of closed form: the nearest support of all ellipsoids along the normal.
-    support = np.sqrt((axes**2 * wall.normal**2).sum(axis=1))
-    nearest = float((contacts.centre @ wall.normal - support).min())
-    found = first_contact_shift(wall, ellipsoids, contacts)
-    assert found == pytest.approx(-nearest / wall.normal[0], abs=1e-9)
+    # Closed form: the centre's distance less the support of the ellipsoid along the normal.
+    support = np.sqrt((squares * wall.normal**2).sum(axis=1))
+    distance = contacts.centre @ wall.normal - support
+    segment, (separation, *answers) = nearest(wall, ellipsoids, contacts)
+    assert segment == int(np.argmin(distance))
+    assert separation == pytest.approx(distance.min(), abs=1e-12)
+    normal, point, weight, region = answers[:3], answers[3:6], answers[6], answers[7]
+    np.testing.assert_allclose(normal, wall.normal)
+    assert wall.normal @ point == pytest.approx(separation, abs=1e-12)
+    assert (weight, region) == (1.0, 0)

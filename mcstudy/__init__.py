@@ -1,1 +1,1 @@
-"""Methods: what one does with any crash model."""
+"""Methods for uncertainty quantification with any crash model."""

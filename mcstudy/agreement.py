@@ -1,8 +1,8 @@
-"""How far two methods agree on the same inputs, and how much of the spread is the method.
+"""Agreement of two methods on the same inputs, and model-form uncertainty.
 
-Every input row is run by every method, so the method is a categorical factor that is crossed with
-all other inputs, and the variance of an output splits exactly into three shares: the method alone,
-the inputs alone, and what both do together.
+Every input row is run by every method, so the method is a categorical factor crossed with all other
+inputs, and the variance of an output splits exactly into three shares: the method alone, the inputs
+alone, and their interaction.
 """
 
 from collections.abc import Callable
@@ -19,25 +19,26 @@ Array = NDArray[np.float64]
 Parts = NDArray[np.int64]
 
 BINS = 20
-"""Bins of equal count in which what two methods disagree over is averaged along an input."""
+"""Bins of equal count in which the methods' difference is averaged along an input."""
 DUMMIES = 20
-"""Dummies whose best draws the noise line: one input in twenty passes it by chance."""
+"""Dummies whose largest value is the noise line: one input in twenty passes it by chance."""
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """How a method's values go with a reference method's on the same inputs.
+    """Agreement of a method with a reference method on the same inputs.
 
     Correlations are NaN where a method's values do not vary beyond rounding.
 
     Attributes
     ----------
-    pairs : runs with a value of both.
+    pairs : number of runs with a value of both.
     correlation, rank_correlation, concordance : Pearson's, Spearman's and Lin's coefficient.
-    bias : mean of method minus reference. spread : standard deviation of that difference.
+    bias : mean of method minus reference.
+    spread : standard deviation of method minus reference.
     lower, upper : limits of agreement, between which 95 % of normal differences lie.
     outside : share of the differences beyond them.
-    slope : by which the difference grows with the mean of both.
+    slope : of the difference against the mean of both.
     """
 
     pairs: int
@@ -60,9 +61,10 @@ class VarianceSplit:
 
     Attributes
     ----------
-    method : of the methods' means. inputs : of the mean over the methods. together : of what the
-        methods make of the inputs differently.
-    total : the variance itself.
+    method : main effect of the method.
+    inputs : effect of all inputs, averaged over the methods.
+    together : interaction of method and inputs.
+    total : variance of the output.
     """
 
     method: Estimate
@@ -72,18 +74,20 @@ class VarianceSplit:
 
 
 def without_rounding(reference: Array, method: Array) -> Array:
-    """Return a method's values, the reference's where all of them differ by rounding alone."""
+    """Return a method's values, or the reference's where all differ by rounding alone."""
     size = np.maximum(np.abs(reference), np.abs(method))
     return reference if np.all(np.abs(method - reference) <= ROUNDING * size) else method
 
 
 def compare(reference: Array, method: Array, parts: Parts) -> Agreement:
-    """Return how a method agrees with a reference.
+    """Return the agreement of a method with a reference.
 
     Parameters
     ----------
-    reference, method : (n,) finite values on the same inputs.
-    parts : (n,) independent part of the design that each run belongs to.
+    reference, method : (n,) array
+        Finite values on the same inputs.
+    parts : (n,) array of int
+        Independent part of the design that each run belongs to.
 
     Raises
     ------
@@ -132,8 +136,10 @@ def split_variance(values: Array, parts: Parts) -> VarianceSplit:
 
     Parameters
     ----------
-    values : (n, methods), finite: every input row run by every method.
-    parts : (n,) independent part of the design that each row belongs to.
+    values : (n, methods) array
+        Finite; every input row run by every method.
+    parts : (n,) array of int
+        Independent part of the design that each row belongs to.
 
     Notes
     -----
@@ -162,21 +168,27 @@ def split_variance(values: Array, parts: Parts) -> VarianceSplit:
 def sources_of_disagreement(
     reference: Array, method: Array, inputs: Array, seed: int
 ) -> tuple[Array, float]:
-    """Return what the rank correlation gains if an input's disagreement is taken out.
+    """Return the gain in rank correlation if the disagreement along each input is removed.
 
     Parameters
     ----------
-    reference, method : (n,) finite. inputs : (n, d). seed : of the dummies.
+    reference, method : (n,) array
+        Finite values on the same inputs.
+    inputs : (n, d) array
+    seed : int
+        Of the dummies.
 
     Returns
     -------
-    gains : (d,) rank correlation with the mean difference of ranks along each input taken out,
-        less the one as it is.
-    noise : the largest gain of twenty dummies.
+    gains : (d,) array
+        Rank correlation with the mean difference of ranks along each input removed, minus the rank
+        correlation.
+    noise : float
+        Largest gain of twenty dummies.
 
     Notes
     -----
-    There is no correlation to gain where a method does not vary: all are NaN then.
+    Where a method does not vary there is no rank correlation, and all are NaN.
     """
     if not (varies(reference) and varies(method)):
         return np.full(inputs.shape[1], np.nan), np.nan
@@ -190,7 +202,7 @@ def sources_of_disagreement(
 
 
 def _without(one: Array, two: Array, column: Array) -> float:
-    """Return the correlation with the mean difference along a column taken out."""
+    """Return the correlation with the mean difference along a column removed."""
     order = np.argsort(column, kind="stable")
     taken = np.empty_like(two)
     for part in np.array_split(order, BINS):
@@ -199,12 +211,12 @@ def _without(one: Array, two: Array, column: Array) -> float:
 
 
 def _components(values: Array) -> Array:
-    """Return the variances (3,): of the method, of the inputs, of both together."""
+    """Return the variances (3,): of the method, of the inputs, of their interaction."""
     n = len(values)
     within = float(np.mean(values.var(axis=1)))
     means = values.mean(axis=0)
     of_inputs = float(np.var(values.mean(axis=1), ddof=1))
-    # Of the spread of the means a share 1/n of the joint part is sampling.
+    # Sampling adds 1/n of the interaction to the variance of the methods' means.
     spread = float(np.var(means))
     together = max((within - spread) * n / (n - 1), 0.0)
     of_method = max(spread - together / n, 0.0)
@@ -229,7 +241,7 @@ def _pearson(pair: Array) -> float:
 
 
 def _spearman(pair: Array) -> float:
-    # Ranks of what differs by rounding alone would tell it apart.
+    # Ranks would amplify differences that are rounding alone.
     if not (varies(pair[:, 0]) and varies(pair[:, 1])):
         return np.nan
     return _pearson(np.stack([stats.rankdata(column) for column in pair.T], axis=1))
@@ -237,7 +249,7 @@ def _spearman(pair: Array) -> float:
 
 def _concordance(pair: Array) -> float:
     one, two = pair[:, 0], pair[:, 1]
-    # Constants have no correlation of any kind, however far apart they are.
+    # Two constants have no correlation, whatever their distance.
     if not (varies(one) or varies(two)):
         return np.nan
     apart = one.var() + two.var() + (one.mean() - two.mean()) ** 2

@@ -1,4 +1,4 @@
-"""Errors that a user can cure."""
+"""Errors with a message for the user."""
 
 
 def on_one_line(text: object, longest: int = 2000) -> str:

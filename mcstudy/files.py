@@ -1,4 +1,4 @@
-"""Text files as people's programs write them: byte order marks, code pages, line ends."""
+"""Text files of other programs: byte order marks, code pages, line ends."""
 
 import codecs
 import re
@@ -35,7 +35,7 @@ def read_text(path: Path) -> str:
         # Older programs write the Western code page.
         return raw.decode("cp1252")
     except UnicodeDecodeError:
-        # Five bytes have no letter there.
+        # Windows-1252 leaves five bytes undefined.
         return raw.decode("latin-1")
 
 

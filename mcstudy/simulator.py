@@ -1,4 +1,4 @@
-"""What the methods need to know of a model: a structural type, so that they import no physics."""
+"""Structural types of a model, so that the methods import no physics."""
 
 from collections.abc import Mapping, Sequence
 from typing import Protocol
@@ -39,7 +39,7 @@ class HistoryLike(Protocol):
 
 
 class Simulator(Protocol):
-    """A model as the methods see it."""
+    """A model as seen by the methods."""
 
     @property
     def name(self) -> str: ...

@@ -1,4 +1,4 @@
-"""Honest numbers of a sample: estimates with the intervals that its design allows.
+"""Estimates with confidence intervals that the sampling design supports.
 
 Independent samples get order-statistic intervals for quantiles and Wilson intervals for
 probabilities. Latin hypercube and Sobol' samples are not independent; their intervals come from the
@@ -19,7 +19,7 @@ CONFIDENCE = 0.95
 REACH = float(stats.norm.ppf(0.5 + CONFIDENCE / 2.0))
 """Standard deviations of a normal interval on either side."""
 ROUNDING = 1e-12
-"""Spread over size up to which values count as one value: sums round by less (assumed)."""
+"""Relative range below which values count as equal: sums round by less (assumed)."""
 
 
 @dataclass(frozen=True)
@@ -35,24 +35,24 @@ class Estimate:
         return asdict(self)
 
     def times(self, factor: float) -> "Estimate":
-        """Return the estimate of values that are larger by a factor."""
+        """Return the estimate multiplied by a factor."""
         return Estimate(factor * self.value, factor * self.low, factor * self.high)
 
 
 def varies(values: Array) -> bool:
-    """Tell whether the finite values differ by more than rounding."""
+    """Return whether the finite values differ by more than rounding."""
     part = values[np.isfinite(values)]
     if part.size < 2:
         return False
     low, high = float(part.min()), float(part.max())
-    # Halves, as the difference of the largest numbers is none.
+    # Halves: the difference of the largest numbers would overflow.
     return 0.5 * high - 0.5 * low > 0.5 * ROUNDING * max(abs(low), abs(high))
 
 
 def scale_of(values: Array) -> float:
-    """Return about the largest size of the finite values, as a power of two.
+    """Return the largest absolute finite value, rounded up to a power of two.
 
-    Values over their scale have the same digits and squares that neither overflow nor vanish.
+    Division by it keeps all digits, and squares then neither overflow nor vanish.
     """
     part = values[np.isfinite(values)]
     exponent = math.frexp(float(np.abs(part).max(initial=0.0)))[1]
@@ -64,7 +64,10 @@ def mean(values: Array, replicate: NDArray[np.int64] | None = None) -> Estimate:
 
     Parameters
     ----------
-    values : (n,) finite. replicate : (n,) or None if the samples are independent.
+    values : (n,) array
+        Finite.
+    replicate : (n,) array of int or None
+        Replicate of each sample; None if the samples are independent.
     """
     if replicate is not None:
         return _between(values, replicate, lambda p: float(p.mean()), float(values.mean()))
@@ -74,7 +77,7 @@ def mean(values: Array, replicate: NDArray[np.int64] | None = None) -> Estimate:
 def standard_deviation(values: Array, replicate: NDArray[np.int64] | None = None) -> Estimate:
     """Return the standard deviation with an interval.
 
-    For independent samples it is the large-sample one, from the variance of squared deviations.
+    For independent samples it is a large-sample interval, from the variance of squared deviations.
     """
     value = float(values.std(ddof=1)) if values.size > 1 else np.nan
     if replicate is not None:
@@ -90,7 +93,17 @@ def standard_deviation(values: Array, replicate: NDArray[np.int64] | None = None
 def quantile(
     values: Array, probability: float, replicate: NDArray[np.int64] | None = None
 ) -> Estimate:
-    """Return a quantile with an order-statistic or between-replicate interval."""
+    """Return a quantile with an order-statistic or between-replicate interval.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Finite.
+    probability : float
+        Of the quantile, 0 to 1.
+    replicate : (n,) array of int or None
+        Replicate of each sample; None if the samples are independent.
+    """
     value = float(np.quantile(values, probability))
     if replicate is not None:
         return _between(values, replicate, lambda p: float(np.quantile(p, probability)), value)
@@ -161,7 +174,10 @@ def between_replicates(estimates: Array, pooled: float) -> Estimate:
 
     Parameters
     ----------
-    estimates : (r,) one a replicate. pooled : the estimate from all of them.
+    estimates : (r,) array
+        One a replicate.
+    pooled : float
+        Estimate from all replicates together.
     """
     return _t_interval(estimates, pooled)
 

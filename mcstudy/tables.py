@@ -1,9 +1,8 @@
-"""Tables of people's: CSV with commas, semicolons or tabs, every field where it belongs.
+"""CSV tables with commas, semicolons or tabs, read strictly.
 
-A file whose columns are separated by semicolons or tabs may have decimal commas, as programs write
-them where the comma is the decimal sign; with commas between the columns a decimal comma cannot be
-told from a separator, and is refused. A row with another number of fields than the header is
-refused, never shifted.
+A file whose columns are separated by semicolons or tabs may have decimal commas; with commas
+between the columns a decimal comma is ambiguous and is refused. A row with another number of fields
+than the header is refused, never shifted.
 """
 
 import csv
@@ -24,21 +23,22 @@ Array = NDArray[np.float64]
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 _DECLARED = re.compile(r"sep=([,;\t]?)[,;\t]*", re.IGNORECASE)
-"""What spreadsheets write above a table to tell what separates its columns."""
+"""Line above a table in which spreadsheets declare the separator of its columns."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _INFINITE = re.compile(r"[+-]?inf(inity)?", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class TextTable:
-    """A table as it stands in its file.
+    """A table of text fields as read from its file.
 
     Attributes
     ----------
-    path : Path, of the file.
-    columns : fields by name of the column, without blanks around them.
+    path : of the file.
+    columns : fields by name of the column, without surrounding blanks.
     lines : line of the file in which each row ends.
-    separator : between the columns. text : columns that hold no numbers.
+    separator : between the columns.
+    text : names of columns that hold no numbers.
     """
 
     path: Path
@@ -68,8 +68,14 @@ class TextTable:
 
         Parameters
         ----------
-        name : of the column. missing : lower-case words that stand for nothing as well.
-        infinite : whether ``inf`` is a number. advice : for a field that is no number.
+        name : str
+            Name of the column.
+        missing : sequence of str
+            Lower-case words that count as empty.
+        infinite : bool
+            Whether ``inf`` is a number.
+        advice : str
+            Advice for the error message of a field that is no number.
 
         Raises
         ------
@@ -125,11 +131,14 @@ class TextTable:
 
 
 def read_csv(path: Path, text: Collection[str] = ()) -> TextTable:
-    """Read a table; its header tells what separates the columns, or a line ``sep=;`` above it.
+    """Read a table; the header line, or a line ``sep=;`` above it, determines the separator.
 
     Parameters
     ----------
-    path : of the file. text : columns that hold no numbers.
+    path : Path
+        Of the file.
+    text : collection of str
+        Names of columns that hold no numbers.
 
     Raises
     ------
@@ -171,7 +180,7 @@ def read_csv(path: Path, text: Collection[str] = ()) -> TextTable:
 
 
 def _separator_of(text: str) -> str:
-    """Return what the first line that is not empty has most of."""
+    """Return the most frequent separator of the first line that is not empty."""
     head = next((line for line in lines_of(text) if line.strip()), "")
     if declared := _DECLARED.fullmatch(head.strip(" ")):
         return declared[1] or ","
@@ -180,7 +189,7 @@ def _separator_of(text: str) -> str:
 
 
 def _comma_hint(row: Sequence[str], separator: str) -> str:
-    """Return what to do if it looks as if commas were decimal commas, at the row's first number."""
+    """Return advice if the row's first number seems to have a decimal comma."""
     if not row[-1]:
         return ": it ends with a separator"
     if separator != ",":

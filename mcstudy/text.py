@@ -1,4 +1,4 @@
-"""Numbers as people write them."""
+"""Numbers formatted for reports."""
 
 import math
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ _UNITS = {"1": "", "m/s2": "m/s²", "rad/s2": "rad/s²"}
 def number(value: float | None, digits: int = 3) -> str:
     """Return a number with the given significant digits.
 
-    In powers of ten only where it is longer than people read: above a billion, below a billionth.
+    In powers of ten only above a billion and below a billionth.
     """
     if value is None or not math.isfinite(value):
         return "–"
@@ -34,7 +34,17 @@ def unit(name: str) -> str:
 
 
 def quantity(value: float | None, name: str, digits: int = 3) -> str:
-    """Return a number with its unit."""
+    """Return a number with its unit.
+
+    Parameters
+    ----------
+    value : float or None
+        A dash is printed for None and for what is not finite.
+    name : str
+        Unit as in study files.
+    digits : int
+        Significant digits.
+    """
     return f"{number(value, digits)} {unit(name)}".strip()
 
 

@@ -1,4 +1,4 @@
-"""Units of study files, converted to SI at the border, once."""
+"""Units of study files and their conversion to the models' units on input."""
 
 import math
 
@@ -44,7 +44,7 @@ _LOWER = {name.lower(): name for name in _UNITS}
 
 
 def canonical(name: str) -> str:
-    """Return a unit as it is named here, whatever its case or spelling; unknown ones as given.
+    """Return the canonical name of a unit in any case or spelling; unknown units unchanged.
 
     No two units here differ in case alone.
     """
@@ -58,7 +58,7 @@ def unit_names() -> tuple[str, ...]:
 
 
 def factor(unit: str, target: str) -> float:
-    """Return what a value in ``unit`` is multiplied with to be in ``target``.
+    """Return the factor that converts a value from ``unit`` to ``target``.
 
     Raises
     ------

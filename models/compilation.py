@@ -1,9 +1,9 @@
 """Numba settings shared by every compiled kernel.
 
-Numba's own disk cache notices a change in the file of the compiled function only, not in the
-kernels that it calls, and compiles again when a line above the function moves. The cache folder is
-therefore named after a digest of the code of this package, without comments, docstrings and places
-of lines: an edit of the code gives a fresh cache, nothing else does.
+Numba's own disk cache detects a change only in the file of the compiled function, not in the
+kernels that it calls, and it compiles again when a line above the function moves. The cache folder
+is therefore named after a digest of the code of this package without comments, docstrings and line
+numbers: only an edit of the code starts a fresh cache.
 """
 
 import ast
@@ -21,7 +21,7 @@ from numba.core.caching import IndexDataCacheFile
 
 
 def _without_docstrings(tree: ast.AST) -> ast.AST:
-    """Return a tree whose docstrings, its own and those in it, are gone."""
+    """Return a tree without its docstrings, nested ones included."""
     for node in ast.walk(tree):
         if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
             continue
@@ -32,7 +32,7 @@ def _without_docstrings(tree: ast.AST) -> ast.AST:
 
 
 def digest_of(sources: Sequence[bytes]) -> str:
-    """Return a digest of the code of Python sources: what is no code does not change it."""
+    """Return a digest of the code of Python sources; comments and docstrings do not change it."""
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sources:
         digest.update(ast.dump(_without_docstrings(ast.parse(source))).encode())
@@ -40,7 +40,7 @@ def digest_of(sources: Sequence[bytes]) -> str:
 
 
 def _package_digest(base: Path) -> str:
-    """Return the digest of this package's code, kept below ``base`` by that of its bytes."""
+    """Return the digest of this package's code, cached by a digest of the files' bytes."""
     sources = [path.read_bytes() for path in sorted(Path(__file__).parent.rglob("*.py"))]
     whole = hashlib.sha256(numba.__version__.encode() + b"".join(sources)).hexdigest()[:16]
     kept = base / "mcstudy" / "sources" / whole
@@ -48,7 +48,7 @@ def _package_digest(base: Path) -> str:
         return kept.read_text()
     found = digest_of(sources)
     if _usable(kept.parent):
-        # A process that reads it meanwhile sees nothing or all of it.
+        # A process that reads it at the same time sees no file or the complete one.
         with tempfile.NamedTemporaryFile("w", dir=kept.parent, delete=False) as file:
             file.write(found)
         Path(file.name).replace(kept)
@@ -56,19 +56,19 @@ def _package_digest(base: Path) -> str:
 
 
 def _usable(folder: Path) -> bool:
-    """Return whether a folder is there, or can be made, and can be written."""
+    """Return whether a folder exists or can be created, and is writable."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
-        # Compiled code that somebody else may have put there is not run.
+        # Compiled code that another user may have put there is not run.
         return not hasattr(os, "getuid") or folder.stat().st_uid == os.getuid()
     except OSError:
         return False
 
 
 def _user_cache() -> Path | None:
-    """Return the user's cache folder, None if there is neither HOME nor an entry among users."""
+    """Return the user's cache folder, or None if no home folder can be found."""
     try:
         return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     except RuntimeError:
@@ -78,7 +78,7 @@ def _user_cache() -> Path | None:
 def _cache_folder() -> Path | None:
     """Return the folder of compiled kernels: in the user's cache, else in the temporary folder.
 
-    None if neither can be written: the kernels are compiled anew in every process then.
+    None if neither is writable: the kernels are then compiled again in every process.
     """
     name = f"kernels-{_DIGEST}"
     wanted = None if _BASE is None else _BASE / "mcstudy" / name
@@ -106,7 +106,7 @@ if "NUMBA_CACHE_DIR" not in os.environ:
     if _folder is not None:
         numba.config.CACHE_DIR = str(_folder)  # type: ignore[attr-defined]
         if _folder.name.startswith("mcstudy-"):
-            # Worker processes take it over and say nothing.
+            # Worker processes inherit the folder and print no message.
             os.environ["NUMBA_CACHE_DIR"] = str(_folder)
 
 
@@ -131,7 +131,7 @@ def _compile(
     }
     compiled: Any = numba.njit(**flags)(function)
     if _CACHED:
-        # Neither the file's date nor the line of the function counts, but the code.
+        # The cache key is the code, not the file's date or the line of the function.
         place = f"{function.__module__}.{function.__qualname__}"
         file: Callable[..., Any] = IndexDataCacheFile
         compiled._cache._cache_file = file(compiled._cache.cache_path, place, _DIGEST)
@@ -142,22 +142,22 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function in nopython mode, cached on disk.
 
     Kernels allocate nothing, so Numba's reference counting is left out: counting the arrays of the
-    named tuples at every call cost ten times the arithmetic. Of fast-math only the fusing of a
-    product and a sum is allowed: it is decided when the code is compiled, so a batch row gives the
-    same bits in every process.
+    named tuples at every call cost ten times the arithmetic. Of the fast-math options only the
+    contraction of a product and a sum (fused multiply-add) is allowed: it is decided at compile
+    time, so a batch row gives the same bits in every process.
     """
     return _compile(function)
 
 
 def inlined_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile like ``kernel`` and merge the code into its callers.
+    """Compile like ``kernel`` and inline the code into its callers.
 
-    For what the step loop calls: handing a named tuple of arrays to a function that is not merged
-    copies some hundred words.
+    Used for what the step loop calls: passing a named tuple of arrays to a function that is not
+    inlined copies some hundred words.
     """
     return _compile(function, inline=True)
 
 
 def unfused_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile like ``kernel`` with every product rounded: the bits of the same NumPy expression."""
+    """Compile like ``kernel`` with every product rounded: the same bits as the NumPy expression."""
     return _compile(function, fuse=False)

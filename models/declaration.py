@@ -1,4 +1,4 @@
-"""Inputs and outputs of a model as its data file declares them."""
+"""Inputs and outputs of a model as declared in its data file."""
 
 from collections.abc import Callable
 from typing import Any
@@ -43,7 +43,7 @@ def run_rows(
     evaluate: Callable[[dict[str, float]], tuple[str, dict[str, float]]],
     started: Callable[[int], None] | None = None,
 ) -> Batch:
-    """Return the batch of (n, inputs) rows, each evaluated on its own.
+    """Return the batch of (n, inputs) rows, each evaluated independently.
 
     Parameters
     ----------
@@ -51,14 +51,14 @@ def run_rows(
     rows : (n, inputs) array
         In the order of ``model.inputs``.
     evaluate : callable
-        Gives status and outputs by name for the inputs by name.
+        Returns status and outputs by name for the inputs by name.
     started : callable, optional
         Called with the number of each row before it is evaluated.
 
     Raises
     ------
     ValueError
-        If the shape does not fit, or a value lies outside its range.
+        If the shape does not match, or a value lies outside its range.
     """
     names = [item.name for item in model.inputs]
     rows = np.asarray(rows, dtype=np.float64)
@@ -68,7 +68,7 @@ def run_rows(
     high = np.array([item.high for item in model.inputs])
     outside = ~((rows >= low) & (rows <= high)).all(axis=1)
     if outside.any():
-        # The first of them says which input it is.
+        # The error message for the first such row names the input.
         complete_inputs(model, dict(zip(names, rows[np.argmax(outside)].tolist(), strict=True)))
     table = np.empty((rows.shape[0], len(model.outputs)))
     status = []

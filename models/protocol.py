@@ -1,4 +1,4 @@
-"""What a crash model is: named inputs, named outputs, one run with histories, and batches.
+"""The crash model protocol: named inputs and outputs, single runs with histories, and batches.
 
 A model never raises for a row of inputs inside its ranges: a run that fails is a row with a status
 other than ``ok`` and NaN where an output has no value. A row of a batch depends on that row alone.
@@ -23,14 +23,18 @@ class Input:
 
     Attributes
     ----------
-    name, unit, meaning : str
-        The unit is the one that the model takes (SI).
-    nominal, low, high : float
-        Nominal value and valid range.
+    name : str
+    unit : str
+        Unit in which the model takes the value (SI).
+    meaning : str
+    nominal : float
+        Nominal value.
+    low, high : float
+        Bounds of the valid range.
     source : str
-        Where the nominal value comes from, with its label.
+        Source of the nominal value, with its label.
     ignored : str
-        Why the model takes the input and makes nothing of it; empty if it does.
+        Why the model accepts the input without using it; empty if it uses it.
     """
 
     name: str
@@ -51,7 +55,7 @@ class Output:
     ----------
     name, unit, meaning : str
     low, high : float
-        Values beyond which a run is not physical, whatever its inputs.
+        Bounds beyond which a run is not physical, whatever its inputs.
     """
 
     name: str
@@ -68,12 +72,12 @@ class Channel:
     Attributes
     ----------
     filter_option : str
-        Option of the model that sets the channel frequency class by which the model filters it;
-        empty if it leaves the channel as it is.
+        Option of the model that sets the channel frequency class of the filter; empty if the model
+        does not filter the channel.
     straight : str
-        Channel that is measured in its place in a straight impact, if there is one.
+        Channel that is measured instead in a straight impact, if there is one.
     outputs : tuple of str
-        Outputs that follow from it: no evidence of their own.
+        Outputs computed from the channel alone, which are therefore no independent evidence.
     code : str
         ISO-MME channel code with ``{}`` for the device; empty if it has none.
     """
@@ -90,8 +94,12 @@ class History:
 
     Attributes
     ----------
-    time : (n,) s.
-    channels : values (n,) by name. units : unit by name.
+    time : (n,) array
+        s.
+    channels : mapping of str to (n,) array
+        Values by name.
+    units : mapping of str to str
+        Unit by name.
     """
 
     time: Array
@@ -113,11 +121,20 @@ def chosen_histories(
     sources: Mapping[str, Mapping[str, tuple[str, Callable[[], Array]]]],
     wanted: Collection[str] | None,
 ) -> dict[str, History]:
-    """Return histories by group, only the channels ``<group>_<channel>`` that are wanted if given.
+    """Return histories by group, restricted to the wanted channels ``<group>_<channel>`` if given.
 
     Parameters
     ----------
-    sources : unit of each channel and how it is had, by group and name.
+    time : (n,) array
+        s.
+    sources : mapping
+        Unit of each channel and a function that computes its values, by group and name.
+    wanted : collection of str, optional
+        Names ``<group>_<channel>``; by default all.
+
+    Returns
+    -------
+    dict of str to History
     """
     found = {}
     for group, channels in sources.items():
@@ -139,7 +156,7 @@ class Mesh:
     ----------
     name : str
     nodes : (f, k, 3) array
-        Places in world axes at each frame, m.
+        Positions in world axes at each frame, m.
     faces : (t, 3) or (t, 4) array
         Nodes of each facet.
     """
@@ -151,17 +168,28 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Scene:
-    """What a picture of a run needs.
+    """Data for a picture or an animation of a run.
 
     Attributes
     ----------
-    time : (f,) s.
-    names : names of the ellipsoids. semi_axes : (n, 3) m.
-    centre : (f, n, 3) m. orientation : (f, n, 4) quaternions (w, x, y, z).
-    car : (f, 3) x, y (m) and yaw (rad) of the car's frame.
-    outline : list of (k, 2) lines x, z (m) of the car's side view in its frame.
-    plan : (k, 2) x, y (m), outline of the car from above in its frame.
-    meshes : surfaces of facets, drawn behind the ellipsoids.
+    time : (f,) array
+        s.
+    names : sequence of str
+        Names of the ellipsoids.
+    semi_axes : (n, 3) array
+        m.
+    centre : (f, n, 3) array
+        Centres of the ellipsoids, world axes, m.
+    orientation : (f, n, 4) array
+        Quaternions (w, x, y, z).
+    car : (f, 3) array
+        x, y (m) and yaw (rad) of the car's frame.
+    outline : sequence of (k, 2) array
+        Lines x, z (m) of the car's side view in its frame.
+    plan : (k, 2) array
+        x, y (m), outline of the car from above in its frame.
+    meshes : sequence of Mesh
+        Surfaces of facets, drawn behind the ellipsoids.
     """
 
     time: Array
@@ -177,7 +205,20 @@ class Scene:
 
 @dataclass(frozen=True)
 class Run:
-    """One run: inputs, status, why it ended, outputs, histories and scene."""
+    """One run.
+
+    Attributes
+    ----------
+    inputs : mapping of str to float
+    status : str
+        ``ok`` or the reason for failure.
+    end_reason : str
+        Why the simulation ended.
+    outputs : mapping of str to float
+    histories : mapping of str to History
+        By group.
+    scene : Scene, optional
+    """
 
     inputs: Mapping[str, float]
     status: str
@@ -193,8 +234,10 @@ class Batch:
 
     Attributes
     ----------
-    outputs : (n, outputs) in the model's order, NaN where an output has no value.
-    status : n strings, ``ok`` or the reason.
+    outputs : (n, outputs) array
+        In the model's order, NaN where an output has no value.
+    status : list of str
+        ``ok`` or the reason, by row.
     """
 
     outputs: Array
@@ -210,7 +253,7 @@ class Model(Protocol):
 
     @property
     def version(self) -> str:
-        """Changes whenever the numbers may change."""
+        """Version; it changes whenever the results may change."""
 
     @property
     def inputs(self) -> tuple[Input, ...]:
@@ -222,7 +265,7 @@ class Model(Protocol):
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects that it can switch on."""
+        """Names of the effects that can be switched on."""
 
     @property
     def partial_status(self) -> frozenset[str]:
@@ -230,7 +273,7 @@ class Model(Protocol):
 
     @property
     def channels(self) -> Mapping[str, Channel]:
-        """What tests may measure, by name; other channels of the histories have no traits."""
+        """Channels that tests may measure, by name; other channels have no entry."""
 
     @property
     def isomme_device(self) -> str:
@@ -238,11 +281,11 @@ class Model(Protocol):
 
     @property
     def accidents(self) -> bool:
-        """Whether a run is a whole accident, whose scalars alone are measured."""
+        """Whether a run is a complete accident, of which only scalars are measured."""
 
     @property
     def cost(self) -> float:
-        """CPU time of a run in s, about."""
+        """Approximate CPU time of a run in s."""
 
     def run(self, inputs: Mapping[str, float]) -> Run:
         """Run once, with time histories; inputs left out take their nominal values."""
@@ -253,10 +296,28 @@ class Model(Protocol):
         channels: Collection[str],
         outputs: Collection[str] = (),
     ) -> Run:
-        """Run once for what a test records: channels ``<group>_<channel>`` and outputs by name."""
+        """Run once and return only what a test records.
+
+        Parameters
+        ----------
+        inputs : mapping of str to float
+            Inputs left out take their nominal values.
+        channels : collection of str
+            Names ``<group>_<channel>``.
+        outputs : collection of str
+            Names of outputs.
+        """
 
     def run_batch(self, rows: Array, started: Callable[[int], None] | None = None) -> Batch:
-        """Run (n, inputs) rows, calling ``started`` with the number of each before it is run."""
+        """Run (n, inputs) rows.
+
+        Parameters
+        ----------
+        rows : (n, inputs) array
+            In the order of ``inputs``.
+        started : callable, optional
+            Called with the number of each row before it is run.
+        """
 
 
 def complete_status(model: Model) -> frozenset[str]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from models.protocol import Model
 
-# name: module and factory, imported only when asked for.
+# name: module and factory, imported on request.
 _MODELS = {
     "headform": ("models.headform.model", "HeadformModel"),
     "multibody": ("models.multibody.model", "MultibodyModel"),
@@ -33,7 +33,7 @@ def load_model(
     options : mapping, optional
         Choices that are not inputs, such as ``vehicle``.
     effects : mapping, optional
-        By effect that is switched on the values of its parameters.
+        Parameter values of each effect that is switched on, by effect.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Quaternion and rotation-matrix kernels.
 
-Quaternions are ``(w, x, y, z)`` and turn body coordinates into world coordinates.
+Quaternions are ``(w, x, y, z)`` and rotate body coordinates into world coordinates.
 """
 
 import math
@@ -27,9 +27,19 @@ def quaternion_to_matrix(q, R):
 
 @inlined_kernel
 def rotate_quaternion(q, i, ax, ay, az):
-    """Turn row ``i`` of ``q`` (n, 4) in place by a world rotation vector in rad."""
+    """Rotate row ``i`` of ``q`` in place by a world rotation vector.
+
+    Parameters
+    ----------
+    q : (n, 4) array
+        Unit quaternions; row ``i`` is changed.
+    i : int
+        Row.
+    ax, ay, az : float
+        Rotation vector in world axes, rad.
+    """
     square = ax * ax + ay * ay + az * az
-    # sin(t/2)/t and cos(t/2) by series: a step turns a segment by far less than 0.1 rad,
+    # sin(t/2)/t and cos(t/2) by series: a step rotates a segment by far less than 0.1 rad,
     # where the first dropped term is below 1e-16.
     if square < 0.01:
         s = 0.5 - square * (1.0 / 48.0 - square * (1.0 / 3840.0 - square / 645120.0))
@@ -50,7 +60,7 @@ def rotate_quaternion(q, i, ax, ay, az):
 
 
 def axis_rotation(axis: int, angle: float) -> np.ndarray:
-    """Return the quaternion of a turn by ``angle`` (rad) about axis 0 (x), 1 (y) or 2 (z)."""
+    """Return the quaternion of a rotation by ``angle`` (rad) about axis 0 (x), 1 (y) or 2 (z)."""
     q = np.zeros(4)
     q[0] = math.cos(0.5 * angle)
     q[1 + axis] = math.sin(0.5 * angle)

@@ -1,1 +1,1 @@
-"""Programs that make what the project ships: example data, pictures, calibrated values."""
+"""Programs that make example data, gallery figures and calibrated values."""

@@ -1,4 +1,4 @@
-"""The demonstration: a hidden effect is found, the model extended, the injury study run again.
+"""Demonstration: find a hidden effect, extend the model and repeat the injury study.
 
 ``make diagnose-demo`` runs this module.
 """
@@ -35,7 +35,7 @@ LOWEST, HIGHEST = 0.024, 0.034
 """m between which the hidden clearance is drawn."""
 STIFFNESS = 2.5e5
 """N/m of what lies below the hood (assumed)."""
-TITLES = {"base": "model as it stands", "extended": "extended model"}
+TITLES = {"base": "base model", "extended": "extended model"}
 
 
 def run_demo(
@@ -45,8 +45,14 @@ def run_demo(
 
     Parameters
     ----------
-    out : folder, made anew. study_file : injury study. seed : of what is hidden and of the tests.
-    workers : processes, -1 for one a core.
+    out : path
+        Folder, replaced.
+    study_file : path
+        Injury study.
+    seed : int
+        Seed of the hidden effect and of the tests.
+    workers : int
+        Processes, -1 for one per core.
 
     Returns
     -------
@@ -72,7 +78,7 @@ def run_demo(
     folder = ResultsFolder(out)
     with folder.open_for_writing():
         return publish(
-            folder, "A hidden effect found, and what it changes",
+            folder, "A hidden effect and its effect on the injury study",
             "18 headform tests; the injury study before and after",
             {"hidden": hidden, "answer": answer, "injuries": injuries},
             lambda held: _draw(held, out), _sections,
@@ -106,21 +112,21 @@ def _sections(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list[S
         rows.append([TITLES[name], percent(above), percent(injured)])
     return [
         Section(
-            "What was found in the tests",
+            "Findings in the tests",
             summarise(analysis["answer"]),
             [],
             {"Three of the tests.": figures["pulses"], "Causes.": figures["evidence"]},
         ),
         Section(
-            "What had been hidden",
+            "Hidden effect",
             [
                 f"A structure {1e3 * hidden['clearance']:.2f} mm below the hood, "
-                f"{1e-3 * hidden['stiffness']:.0f} kN/m. The tests were made by another program "
-                "than the one that found it."
+                f"{1e-3 * hidden['stiffness']:.0f} kN/m. The tests were made by a program "
+                "independent of the diagnosis."
             ],
         ),
         Section(
-            "What it changes for the children",
+            "Effect on the injury study",
             words.gain_words(analysis["answer"]["gain"]),
             [Table("The injury study with either model.",
                    ["model", "HIC15 above the limit", "AIS 3 or worse"], rows)],

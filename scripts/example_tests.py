@@ -1,7 +1,7 @@
 """Make the example of measured data in ``configs/hood_tests``: six simulated headform tests.
 
 Run as ``python -m scripts.example_tests``. The curves are drawn from a corridor and hidden in
-signals with noise, offset and lead-in, so that `mcstudy fit-stiffness` has something to find.
+signals with noise, offset and lead-in, for `mcstudy fit-stiffness`.
 """
 
 from pathlib import Path

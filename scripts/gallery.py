@@ -1,4 +1,4 @@
-"""Remake the README's pictures from the nominal case, the full studies and the validation."""
+"""Remake the README's figures from the nominal case, the full studies and the validation."""
 
 import shutil
 from pathlib import Path
@@ -12,7 +12,7 @@ GALLERY = Path("results/gallery")
 
 
 def main() -> None:
-    """Run the case and the study and copy the chosen pictures to ``results/gallery``."""
+    """Run the case and the study and copy the chosen figures to ``results/gallery``."""
     _, _, case = run_case("configs/paper_case.toml")
     study = run_study("configs/paper_study.toml", quiet=False)
     drivers = run_study("configs/paper_sobol.toml", quiet=False)

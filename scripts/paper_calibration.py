@@ -1,11 +1,11 @@
-"""Calibrate what the reference case leaves open to the multibody rows of its Tables 1 and 2.
+"""Calibrate the open inputs of the reference case to the multibody rows of its Tables 1 and 2.
 
 Calibrated to: throw distance, wrap-around distance, HIC15 and the place of the head's dent (behind
 the hood edge, inboard of the fender).
-Calibrated inputs, each with a prior from the data sheet: stature (with the mass that goes with
-it), gait phase, facing angle, lateral offset, body-to-car friction, neck stiffness, and a factor
+Calibrated inputs, each with a prior from the data sheet: stature (with the corresponding
+mass), gait phase, facing angle, lateral offset, body-to-car friction, neck stiffness, and a factor
 on the hood's force curve (a position in its corridor, later written into the vehicle file as the
-median). Minimised: squared misfits over the targets' tolerances plus squared prior scores, by
+median). Minimised: squared misfits over the targets' tolerances plus squared prior z-scores, by
 random search and Nelder-Mead. A tumbling body is partly chaotic, so the refinement compares the
 mean over jittered copies of the inputs and not one lucky run. Everything else that the model gives
 is prediction.
@@ -101,7 +101,17 @@ def mean_outputs(x: Array, copies: int) -> dict[str, float]:
 
 
 def calibrate(draws: int, workers: int, seed: int) -> tuple[Array, float]:
-    """Return the best vector of values and its objective."""
+    """Return the best vector of values and its objective.
+
+    Parameters
+    ----------
+    draws : int
+        Number of random starts.
+    workers : int
+        Processes, -1 for one per core.
+    seed : int
+        Seed of the draws.
+    """
     rng = np.random.default_rng(seed)
     means, spreads = np.array(list(PRIORS.values())).T
     x = np.column_stack(

@@ -38,14 +38,18 @@ def run_study(
     workers: Workers = -1,
     quiet: bool = True,
 ) -> ResultsFolder:
-    """Run a study file of any sampled kind, or go on with it where it stopped.
+    """Run a study file of any sampled kind, or resume it where it stopped.
 
     Parameters
     ----------
-    path : study file.
-    out : results folder, by default ``results/<name>``.
-    workers : processes, -1 for one a core, or the address of a dask scheduler.
-    quiet : print no progress line.
+    path : path or str
+        Study file (TOML).
+    out : path or str, optional
+        Results folder, by default ``results/<name>``.
+    workers : int or str
+        Processes, -1 for one per core, or the address of a dask scheduler.
+    quiet : bool
+        No progress line.
 
     Returns
     -------
@@ -98,6 +102,13 @@ def run_case(
     path: Path | str, *, out: Path | str | None = None
 ) -> tuple[Run, list[PublishedTable], ResultsFolder]:
     """Run a reconstruction file and write its folder.
+
+    Parameters
+    ----------
+    path : path or str
+        Study file of a reconstruction (TOML).
+    out : path or str, optional
+        Results folder, by default ``results/<name>``.
 
     Returns
     -------

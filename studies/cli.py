@@ -1,4 +1,4 @@
-"""The command line: one verb a task, the same options and exit codes everywhere.
+"""The command line: one verb per task, with the same options and exit codes for all.
 
 Exit codes: 0 done, 1 the study failed, 2 the user's input is wrong, 130 interrupted.
 """
@@ -31,14 +31,14 @@ Out = Annotated[
 
 def _check_workers(value: int) -> int:
     if value == 0 or value < -1:
-        raise UserError(f"--workers must be 1 or more, or -1 for one a core, given {value}")
+        raise UserError(f"--workers must be 1 or more, or -1 for one per core, given {value}")
     return value
 
 
 Workers = Annotated[
     int,
     typer.Option(
-        help="Worker processes; -1 for one a core, 1 for this process, which a crash would end.",
+        help="Worker processes; -1 for one per core, 1 to run in this process (a crash ends it).",
         callback=_check_workers,
     ),
 ]
@@ -66,7 +66,7 @@ def run(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Run a study, or go on with it where it stopped, and write its report."""
+    """Run a study, or resume it where it stopped, and write its report."""
     from studies import api
 
     where = workers if cluster is None else cluster
@@ -78,7 +78,7 @@ def run(
 
 @app.command()
 def reconstruct(study: Study, out: Out = None, quiet: Quiet = False, as_json: Json = False) -> None:
-    """Run one case, print it beside published tables and draw it."""
+    """Run one case, compare it with published tables and draw it."""
     from studies import api
     from studies.published_tables import as_table
 
@@ -112,12 +112,12 @@ def sensitivity(
         list[str] | None, typer.Option(help="An output to rank; may be repeated.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Where to write; by default sensitivity in the folder.")
+        Path | None, typer.Option(help="Report folder; by default sensitivity in the folder.")
     ] = None,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Measure what drives the outputs of any results folder, whatever its design was."""
+    """Estimate the sensitivity of outputs to inputs from the runs of a results folder."""
     from mcstudy.execution.results import ResultsFolder
     from studies.sensitivity import measure as sensitivity
     from studies.sensitivity import report as sensitivity_report
@@ -140,7 +140,7 @@ def fit_stiffness(
     method: Annotated[
         str, typer.Option(help="How the corridor is built: quantiles or components.")
     ] = "quantiles",
-    knots: Annotated[int, typer.Option(help="Most knots of a loading curve, 2 to 8.")] = 6,
+    knots: Annotated[int, typer.Option(help="Maximum knots of a loading curve, 2 to 8.")] = 6,
     channel: Channel = None,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -169,7 +169,7 @@ def risk_curve(
         typer.Option(min=1, max=6, help="AIS that counts as injured, where there is a column ais."),
     ] = 3,
     scenario: Annotated[
-        str | None, typer.Option(help="Scenario of an injury study; by default as it stands.")
+        str | None, typer.Option(help="Scenario of an injury study; by default the reference.")
     ] = None,
     out: Out = None,
     quiet: Quiet = False,
@@ -196,13 +196,13 @@ def diagnose(
         Path | None, typer.Option(help="Study file whose model is diagnosed.")
     ] = None,
     channel: Channel = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the simulated data sets.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated data sets.")] = 0,
     out: Out = None,
     workers: Workers = -1,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Tell what a simulation gets wrong against measured tests, why, and what a cure gains."""
+    """Find where a model disagrees with tests, the likely cause, and the gain of correcting it."""
     from mcstudy.execution.results import ResultsFolder
     from studies.diagnosis import report as diagnosis_report
     from studies.diagnosis import study as diagnosis
@@ -220,20 +220,20 @@ def diagnose(
 def validate(
     out: Out = None,
     measured: Annotated[
-        Path, typer.Option(help="Folder of real measurements; left out where it is missing.")
+        Path, typer.Option(help="Folder of real measurements; skipped if it is missing.")
     ] = Path("../shared/measured"),
-    only: Annotated[list[str] | None, typer.Option(help="One part; may be repeated.")] = None,
+    only: Annotated[list[str] | None, typer.Option(help="Part to run; may be repeated.")] = None,
     diagnosis: Annotated[
-        bool, typer.Option("--diagnosis", help="Hide effects in data and count what is found.")
+        bool, typer.Option("--diagnosis", help="Hide effects in data and measure detection rates.")
     ] = False,
-    sets: Annotated[int, typer.Option(min=20, help="Sets of tests with --diagnosis, about.")] = 300,
+    sets: Annotated[int, typer.Option(min=20, help="Approximate sets with --diagnosis.")] = 300,
     workers: Workers = -1,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
     """Run the models against closed forms, published numbers and measurements.
 
-    With --diagnosis: hide effects in data, diagnose them, and print how often the truth was found.
+    With --diagnosis: hide effects in data, diagnose them, and print the detection rates.
     """
     from mcstudy.execution.results import ResultsFolder
     from studies.validation import report
@@ -258,7 +258,7 @@ def validate(
 
 @app.command()
 def status(folder: Folder, as_json: Json = False) -> None:
-    """Tell how far the study of a results folder is."""
+    """Show the progress of the study in a results folder."""
     from mcstudy.execution.results import ResultsFolder
 
     results = ResultsFolder(folder)
@@ -276,7 +276,9 @@ def status(folder: Folder, as_json: Json = False) -> None:
 
 @app.command()
 def models(
-    name: Annotated[str | None, typer.Argument(help="A model, for its inputs and outputs.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(help="A model, to list its inputs and outputs.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """List the models, or the inputs and outputs of one."""
@@ -303,7 +305,7 @@ def models(
 @app.command()
 def effects(
     name: Annotated[
-        str | None, typer.Argument(help="An effect, for its parameters and signature.")
+        str | None, typer.Argument(help="An effect, to show its parameters and signature.")
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -323,7 +325,7 @@ def effects(
              ", ".join(p["name"] for p in row["parameters"])]
             for row in catalogue.describe_effects()
         ]  # fmt: skip
-        print_table("", ["effect", "what it is", "models", "parameters"], rows)
+        print_table("", ["effect", "description", "models", "parameters"], rows)
         return
     described = catalogue.describe_effect(name)
     lines = [f"{described['name']}: {described['title']}"]
@@ -372,14 +374,14 @@ def main() -> None:
     except (KeyboardInterrupt, typer.Abort):
         code = 130
     except Exception as error:
-        # Typer's own complaints (unknown option, missing file) carry an exit code and a message.
+        # Typer's own errors (unknown option, missing file) carry an exit code and a message.
         if hasattr(error, "exit_code") and hasattr(error, "format_message"):
             _fail(error.format_message(), 2)
         raise
     if code == 130:
-        _print_failure("interrupted; what arrived is kept, run the same command again to resume")
+        _print_failure("interrupted; finished runs are kept, run the same command again to resume")
         sys.stdout.flush()
-        # Whoever interrupts does not want to wait for libraries to say goodbye.
+        # After an interrupt exit at once, without waiting for libraries to shut down.
         os._exit(130)
     sys.exit(code if isinstance(code, int) else 0)
 

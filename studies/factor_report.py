@@ -1,4 +1,4 @@
-"""What reports of studies that exchange factors have in common."""
+"""Sentences common to the reports of Morris and Sobol' studies."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,9 +7,9 @@ from mcstudy.figures import style
 
 
 def groups_said(analysis: Mapping[str, Any]) -> str:
-    """Say which inputs make up which factor."""
+    """Return a sentence on the inputs of each factor."""
     if not analysis["groups"]:
-        return "Every input is a factor of its own."
+        return "Every input is a separate factor."
     text = "; ".join(
         f"{group}: {', '.join(style.words(name) for name in names)}"
         for group, names in analysis["groups"].items()

@@ -1,4 +1,4 @@
-"""How the runs of a study ended, and where they failed, as every report says it."""
+"""Status of the runs of a study and location of the failures, for every report."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,20 +9,20 @@ from mcstudy.report import Table
 
 
 def failure_map(analysis: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the figure of where runs failed, if any did."""
+    """Return the figure of the location of failed runs, if any."""
     failed = analysis["failures"]
     return {"failures": draw_failures(failed["map"])} if failed["runs"] else {}
 
 
 def failures_said(analysis: Mapping[str, Any], blocks: str = "") -> list[str]:
-    """Say how many runs failed, and where.
+    """Return sentences on how many runs failed, and where.
 
     Parameters
     ----------
     analysis : mapping
-        Of a study.
+        Analysis of a study.
     blocks : str
-        What its runs that belong together are called, if there are any.
+        Name of the blocks of runs, if there are any.
     """
     failed = analysis["failures"]
     if not failed["runs"]:
@@ -31,7 +31,7 @@ def failures_said(analysis: Mapping[str, Any], blocks: str = "") -> list[str]:
         f"{failed['runs']:,} of {analysis['runs']:,} runs failed ({100.0 * failed['share']:.2g} %)"
     )
     if blocks:
-        lost += f", in {failed['blocks']:,} {blocks}, which are left out whole"
+        lost += f", in {failed['blocks']:,} {blocks}, which are excluded"
     lines = [f"{lost}."]
     if failed["where"]:
         words = {"low": "low", "high": "high", "ends": "low or high", "middle": "in the middle"}
@@ -39,16 +39,16 @@ def failures_said(analysis: Mapping[str, Any], blocks: str = "") -> list[str]:
             f"{style.words(name)} {words[entry['place']]} (mean rank {entry['mean_rank']:.2f})"
             for name, entry in failed["where"].items()
         )
-        lines.append(f"Failed runs lie where: {where}.")
+        lines.append(f"Failures concentrate at: {where}.")
     else:
-        lines.append("Failed runs are spread over all inputs as the others are.")
+        lines.append("Failures are spread over all inputs like the other runs.")
     return lines
 
 
 def status_table(analysis: Mapping[str, Any]) -> Table:
-    """Return how the runs ended."""
+    """Return the table of run statuses."""
     rows = [
         [row["ending"], row["status"].replace("_", " "), f"{row['runs']:,}", row["reason"]]
         for row in analysis["endings"]
     ]
-    return Table("How the runs ended.", ["end", "status", "runs", "most frequent reason"], rows)
+    return Table("Status of the runs.", ["end", "status", "runs", "most frequent reason"], rows)

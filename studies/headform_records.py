@@ -15,16 +15,16 @@ Array = NDArray[np.float64]
 
 ACCELERATION = "head_acceleration"
 RISEN = 0.03
-"""Share of the peak from which on a signal has risen (assumed)."""
+"""Share of the peak above which a signal has risen (assumed)."""
 LEAD = 0.25
-"""Share of a filter's settling time that a record begins before its signal rises (assumed)."""
+"""Minimum lead of a record before its rise, as a share of the filter's settling time (assumed)."""
 
 
 def keep_first_impacts(data: Measured) -> Measured:
     """Return measured tests whose head acceleration holds the first impact alone.
 
     Only tests of the headform model with such a signal and a recorded or fixed speed are changed;
-    the notes of each test say what was left out.
+    the notes of each test state what was left out.
     """
     if data.header.model != "headform" or ACCELERATION not in data.header.signals:
         return data
@@ -47,7 +47,7 @@ def keep_first_impacts(data: Measured) -> Measured:
 
 
 def _beginning(impact: Impact, signal: Signal) -> list[str]:
-    """Return what to say of a filtered record that begins too late to hold first contact."""
+    """Return a note on a filtered record that begins too late to hold first contact."""
     if not 0.0 < signal.channel_class < CHANNEL_CLASS:
         return []
     risen = int(np.argmax(impact.acceleration >= RISEN * impact.acceleration.max()))
@@ -55,9 +55,9 @@ def _beginning(impact: Impact, signal: Signal) -> list[str]:
     if lead > LEAD * settling_time(signal.channel_class):
         return []
     return [
-        f"the record begins {1e3 * lead:.1f} ms before the {signal.filter} signal rises: what the "
-        "filter answers before contact is not in it, and penetration and intervals are not to be "
-        "relied on; give the record from before contact"
+        f"the record begins {1e3 * lead:.1f} ms before the {signal.filter} signal rises: the "
+        "filter's response before contact is missing, and penetration and intervals are "
+        "unreliable; give the record from before contact"
     ]
 
 

@@ -8,7 +8,7 @@ from mcstudy.measurement import isomme
 from models.protocol import Model, Run
 
 MIN_COUNT = 8
-"""Samples that an impact with the road takes at least."""
+"""Minimum samples of an impact with the road."""
 
 CAR, ROAD = "car", "road"
 """Phases of a crash: up to the body's first contact with the road, and from it on."""
@@ -23,14 +23,21 @@ _PHASES = {
 def write_isomme(run: Run, model: Model, folder: Path, *, name: str, title: str) -> list[Path]:
     """Write the head signals of a run as ISO-MME tests and return their ``.mme`` files.
 
-    A crash is two tests, the impact with the car and that with the road: criteria of one head
-    signal that held both would be those of the harder one.
+    A crash is two tests, the impact with the car and that with the road: a single
+    head signal would give only the criteria of the harder impact.
 
     Parameters
     ----------
-    run : Run with histories. model : that it is of.
-    folder : in which each test has a folder of its name.
-    name, title : of the test; the impact with the road has ``_road`` behind its name.
+    run : Run
+        With histories.
+    model : Model
+        Model of the run.
+    folder : path
+        Folder in which each test has a folder of its name.
+    name : str
+        Name of the test; the impact with the road has ``_road`` behind it.
+    title : str
+        Title of the test.
 
     Returns
     -------

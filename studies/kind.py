@@ -1,4 +1,4 @@
-"""What every kind of study does alike: check, lock, run, analyse, publish, summarise.
+"""The steps common to all kinds of study: check, lock, run, analyse, publish, summarise.
 
 A kind of study is one folder: its study file (``schema.py``), its plan, analysis, figures and
 sections as a subclass of ``StudyKind``, and one line in ``studies.kinds``.
@@ -25,7 +25,8 @@ class StudyKind(ABC, Generic[Study, Plan, Results]):
 
     Attributes
     ----------
-    schema : class of its study file.
+    schema : type
+        Class of its study file.
     """
 
     schema: ClassVar[type[AnyStudy]]
@@ -39,16 +40,18 @@ class StudyKind(ABC, Generic[Study, Plan, Results]):
         workers: Workers = -1,
         quiet: bool = False,
     ) -> dict[str, Any]:
-        """Run a study, or go on with it, and write its results folder.
+        """Run or resume a study and write its results folder.
 
         Parameters
         ----------
         study : AnyStudy
+            Study file of this kind, checked.
         text : str
             The study file as written.
         folder : ResultsFolder
+            Results folder, new or of the same study.
         workers : int or str
-            Processes, -1 for one a core, or the address of a dask scheduler.
+            Processes, -1 for one per core, or the address of a dask scheduler.
         quiet : bool
             No progress line.
 
@@ -76,8 +79,9 @@ class StudyKind(ABC, Generic[Study, Plan, Results]):
         Parameters
         ----------
         study : AnyStudy
-            As its folder holds it.
+            As read from its folder.
         folder : ResultsFolder
+            Results folder of the study.
 
         Raises
         ------
@@ -99,7 +103,14 @@ class StudyKind(ABC, Generic[Study, Plan, Results]):
 
     @abstractmethod
     def plan(self, study: Study, folder: ResultsFolder) -> Plan:
-        """Return what is to be run: models, checked, and the values of their inputs.
+        """Return the plan: checked models and the values of their inputs.
+
+        Parameters
+        ----------
+        study : AnyStudy
+            Study file of this kind, checked.
+        folder : ResultsFolder
+            Results folder of the study.
 
         Raises
         ------
@@ -111,25 +122,75 @@ class StudyKind(ABC, Generic[Study, Plan, Results]):
     def execute(
         self, study: Study, plan: Plan, folder: ResultsFolder, *, workers: Workers, quiet: bool
     ) -> None:
-        """Run what is missing of a plan; the folder is open for writing."""
+        """Run the missing runs of a plan.
+
+        Parameters
+        ----------
+        study : AnyStudy
+            Study file of this kind, checked.
+        plan : Plan
+            From ``plan``.
+        folder : ResultsFolder
+            Open for writing.
+        workers : int or str
+            Processes, -1 for one per core, or the address of a dask scheduler.
+        quiet : bool
+            No progress line.
+        """
 
     @abstractmethod
     def results(self, study: Study, folder: ResultsFolder) -> Results:
-        """Return what a folder holds for the analysis."""
+        """Return the input of the analysis from a folder.
+
+        Parameters
+        ----------
+        study : AnyStudy
+            Study file of this kind, checked.
+        folder : ResultsFolder
+            Results folder of the study.
+        """
 
     @abstractmethod
     def analyse(self, study: Study, results: Results) -> dict[str, Any]:
-        """Return every number that the report prints."""
+        """Return every number that the report prints.
+
+        Parameters
+        ----------
+        study : AnyStudy
+            Study file of this kind, checked.
+        results : Results
+            From ``results``.
+        """
 
     @abstractmethod
     def subtitle(self, study: Study, results: Results, analysis: Mapping[str, Any]) -> str:
-        """Return the line below the report's title."""
+        """Return the line below the report's title.
+
+        Parameters
+        ----------
+        study : AnyStudy
+            Study file of this kind, checked.
+        results : Results
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        """
 
     @abstractmethod
     def draw(
         self, study: Study, results: Results, analysis: Mapping[str, Any]
     ) -> Mapping[str, Any]:
-        """Return the figures by file name."""
+        """Return the figures by file name.
+
+        Parameters
+        ----------
+        study : AnyStudy
+            Study file of this kind, checked.
+        results : Results
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        """
 
     @abstractmethod
     def sections(
@@ -139,14 +200,39 @@ class StudyKind(ABC, Generic[Study, Plan, Results]):
         analysis: Mapping[str, Any],
         figures: Mapping[str, Any],
     ) -> Sequence[Section]:
-        """Return the sections of the report."""
+        """Return the sections of the report.
+
+        Parameters
+        ----------
+        study : AnyStudy
+            Study file of this kind, checked.
+        results : Results
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        figures : mapping
+            From ``draw``: figures by file name.
+        """
 
     @abstractmethod
     def summarise(self, analysis: Mapping[str, Any]) -> list[str] | list[Table]:
-        """Return what the command line prints of an analysis, paragraphs or tables."""
+        """Return the command line's summary of an analysis, paragraphs or tables.
+
+        Parameters
+        ----------
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        """
 
     def independent_rows(self, runs: Any, folder: ResultsFolder) -> Any:
         """Return the rows of a table of runs that are an independent sample of the inputs.
+
+        Parameters
+        ----------
+        runs : DataFrame
+            One row a run.
+        folder : ResultsFolder
+            Results folder of the study.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""What there is to run: models with their inputs and outputs."""
+"""Listing of models with their inputs and outputs, and of effects."""
 
 from typing import Any
 

@@ -15,12 +15,18 @@ from models.protocol import Model
 def main_effects_of(
     study: SampledStudy, model: Model, runs: pd.DataFrame, output: str
 ) -> dict[str, Any]:
-    """Return what an output does on average along each sampled input.
+    """Return the conditional mean of an output along each sampled input.
 
     Parameters
     ----------
-    study, model : of the runs.
-    runs : independently drawn. output : name.
+    study : SampledStudy
+        Checked study file.
+    model : Model
+        Model of the runs.
+    runs : DataFrame
+        Independent draws of the inputs.
+    output : str
+        Name of the output.
 
     Returns
     -------

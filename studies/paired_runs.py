@@ -1,4 +1,4 @@
-"""Studies of several cells: the same draws through every cell, each in a folder of its own."""
+"""Studies of several cells: the same draws through every cell, each in its own folder."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from studies.runs import columns_of, run_rows
 Array = NDArray[np.float64]
 
 BATCHES = 20
-"""Parts of an independent sample between which intervals are taken (assumed)."""
+"""Batches of an independent sample for intervals between batches (assumed)."""
 
 
 class PairedStudy(Protocol):
@@ -28,7 +28,7 @@ class PairedStudy(Protocol):
 
     @property
     def name(self) -> str:
-        """Of the study."""
+        """Name of the study."""
 
     @property
     def kind(self) -> str:
@@ -36,11 +36,11 @@ class PairedStudy(Protocol):
 
     @property
     def seed(self) -> int:
-        """Of the draws."""
+        """Seed of the draws."""
 
     @property
     def design(self) -> Design:
-        """Of each cell."""
+        """Design of each cell."""
 
 
 @dataclass(frozen=True)
@@ -66,15 +66,20 @@ def run_cells(
     workers: Workers,
     quiet: bool,
 ) -> None:
-    """Run what is missing of all cells and write the study's manifest.
+    """Run the missing runs of all cells and write the study's manifest.
 
     Parameters
     ----------
     study : PairedStudy
-    folder : open for writing.
-    cells : in the order in which they are run.
-    workers : processes, -1 for one a core, or the address of a dask scheduler.
-    quiet : no progress line.
+        Checked study file.
+    folder : ResultsFolder
+        Open for writing.
+    cells : sequence of PreparedCell
+        In the order in which they are run.
+    workers : int or str
+        Processes, -1 for one per core, or the address of a dask scheduler.
+    quiet : bool
+        No progress line.
 
     Raises
     ------
@@ -121,6 +126,17 @@ def run_cells(
 def cell_runs(folder: ResultsFolder, name: str, n: int, model: Model) -> pd.DataFrame:
     """Return the first n runs of a cell of a model.
 
+    Parameters
+    ----------
+    folder : ResultsFolder
+        Of the study.
+    name : str
+        Name of the cell.
+    n : int
+        Number of runs.
+    model : Model
+        Model of the cell.
+
     Raises
     ------
     UserError
@@ -131,7 +147,7 @@ def cell_runs(folder: ResultsFolder, name: str, n: int, model: Model) -> pd.Data
     runs = runs[runs["run"] < n]
     if len(runs) < n:
         raise UserError(
-            f"{inner.path}: {len(runs)} of {n} runs are done; run the study again to go on"
+            f"{inner.path}: {len(runs)} of {n} runs are done; run the study again to resume"
         )
     return runs
 
@@ -139,7 +155,7 @@ def cell_runs(folder: ResultsFolder, name: str, n: int, model: Model) -> pd.Data
 def batch_of(study: PairedStudy, runs: pd.DataFrame) -> NDArray[np.int64]:
     """Return the independent part of the design that each run belongs to, (n,).
 
-    Replicates are such parts; of independent runs any are, so they are cut into twenty.
+    Replicates are such parts; independent runs are cut into twenty batches.
     """
     size = study.design.size if study.design.size > 1 else max(1, study.design.n // BATCHES)
     return runs["run"].to_numpy(dtype=np.int64) // size

@@ -1,4 +1,4 @@
-"""Published tables with rows of our own beside theirs."""
+"""Published tables with rows of our results added."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,12 +23,16 @@ class PublishedTable:
 def compare_with_table(
     table: ComparisonTable, ours: Mapping[str, Mapping[str, float]], si: Mapping[str, str]
 ) -> PublishedTable:
-    """Return a published table with rows of our own below it.
+    """Return a published table with rows of our results below it.
 
     Parameters
     ----------
-    table : as in a study file. ours : outputs in SI units by label of the row.
-    si : unit of each output.
+    table : ComparisonTable
+        As in a study file.
+    ours : mapping
+        Outputs in SI units by label of the row.
+    si : mapping
+        Unit of each output.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a study publishes: its analysis, its figures and its report."""
+"""Writing of a study's analysis, figures and report."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -18,12 +18,22 @@ def publish(
 ) -> dict[str, Any]:
     """Write an analysis, its figures and its report, and return the analysis as it is on disk.
 
-    Figures and report are made of what the file holds, so that they can be made of it again.
+    Figures and report are made from the file's content, so that they can be rebuilt from it.
 
     Parameters
     ----------
-    folder : ResultsFolder. title, subtitle : of the report.
-    draw : analysis to figures by file name. sections_of : analysis and figures to sections.
+    folder : ResultsFolder
+        Results folder of the study.
+    title : str
+        Title of the report.
+    subtitle : str
+        Subtitle of the report.
+    analysis : mapping
+        Every number of the report.
+    draw : callable
+        Analysis to figures by file name.
+    sections_of : callable
+        Analysis and figures to sections.
     """
     folder.write_json("analysis.json", analysis)
     held = folder.read_json("analysis.json")

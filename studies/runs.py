@@ -1,4 +1,4 @@
-"""The runs of a study: its model, its evaluations in parallel, its manifest, its table."""
+"""The runs of a study: its model, parallel evaluations, manifest and table."""
 
 import os
 import platform
@@ -48,13 +48,16 @@ class DescribedStudy(Protocol):
 
 @dataclass(frozen=True)
 class RunPlan:
-    """What a study of one model is to run.
+    """Planned runs of a study of one model.
 
     Attributes
     ----------
     model : Model
-    columns : (n,) values of every input of the model, by name.
-    replicate : (n,) of each row.
+        Model of the runs.
+    columns : dict
+        (n,) values of every input of the model, by name.
+    replicate : (n,) int array
+        Replicate of each row.
     """
 
     model: Model
@@ -98,11 +101,11 @@ def evaluator_of(
     model : Model
         As loaded with the same options and effects.
     options : mapping
-        Of the model.
+        Options of the model.
     effects : mapping, optional
-        Switched on, with their parameters.
+        Effects switched on, with their parameters.
     run_time : float
-        s that one run may take.
+        Time limit of a run in s.
     """
     argument: worker.ModelArgument = {
         "name": model.name,
@@ -130,15 +133,26 @@ def run_rows(
     workers: Workers,
     quiet: bool,
 ) -> pd.DataFrame:
-    """Run what is missing of a design, keep it, write the manifest and return all its runs.
+    """Run and store the missing runs of a design, write the manifest and return all runs.
 
     Parameters
     ----------
-    study, model : of the folder, which is open for writing.
-    columns : (n,) values of every input of the model.
-    design : what the manifest says of the design. replicate : (n,) of each row.
-    workers : processes, -1 for one a core, or the address of a dask scheduler.
-    quiet : no progress line.
+    study : SampledStudy
+        Checked study file.
+    model : Model
+        Model of the folder.
+    columns : mapping
+        (n,) values of every input of the model, by name.
+    folder : ResultsFolder
+        Open for writing.
+    design : mapping
+        Description of the design for the manifest.
+    replicate : (n,) int array
+        Replicate of each row.
+    workers : int or str
+        Processes, -1 for one per core, or the address of a dask scheduler.
+    quiet : bool
+        No progress line.
 
     Raises
     ------
@@ -162,7 +176,7 @@ def run_rows(
         watched = report_outputs(study, model)
         progress = Progress(quiet=quiet, complete=complete, watched=watched)
         runs = runner.run(task, folder, progress)
-    # A study that was larger before keeps its further runs.
+    # A study that was larger before keeps its extra runs.
     folder.compact(held if (held := folder.done()) is not None else runs)
     counts = status_counts(runs)
     manifest |= {
@@ -187,7 +201,10 @@ def complete_blocks(folder: ResultsFolder, model: Model) -> pd.DataFrame:
 
     Parameters
     ----------
-    folder : whose manifest tells of ``n`` runs in blocks of ``block``. model : of the runs.
+    folder : ResultsFolder
+        Its manifest states ``n`` runs in blocks of ``block``.
+    model : Model
+        Model of the runs.
 
     Raises
     ------
@@ -213,11 +230,18 @@ def describe_runs(
     runs: pd.DataFrame,
     block: int = 1,
 ) -> tuple[dict[str, Any], NDArray[np.bool_]]:
-    """Return how the runs of a study ended, and (n,) which are complete.
+    """Return the status of the runs of a study, and (n,) which are complete.
 
     Parameters
     ----------
-    study, model : of the runs. block : rows that belong together.
+    study : DescribedStudy
+        Checked study file.
+    model : Model
+        Model of the runs.
+    runs : DataFrame
+        Table of the runs.
+    block : int
+        Rows of a block, which is complete or left out as a whole.
     """
     words = complete_status(model)
     complete: NDArray[np.bool_] = runs["status"].isin(words).to_numpy(dtype=bool)
@@ -231,12 +255,20 @@ def describe_ends(
     words: frozenset[str],
     block: int = 1,
 ) -> dict[str, Any]:
-    """Return how the runs of a study ended, as every analysis holds it.
+    """Return the status of the runs of a study, as every analysis holds it.
 
     Parameters
     ----------
-    study, runs : of which. complete : (n,) of the runs. words : statuses that are no failure.
-    block : rows that belong together.
+    study : DescribedStudy
+        Checked study file.
+    runs : DataFrame
+        Table of the runs.
+    complete : (n,) bool array
+        Whether each run is complete.
+    words : frozenset of str
+        Statuses that are not failures.
+    block : int
+        Rows of a block.
     """
     return {
         "kind": study.kind,
@@ -250,7 +282,18 @@ def describe_ends(
 def check_failure_rate(
     study: DescribedStudy, model: Model, runs: pd.DataFrame, block: int = 1
 ) -> tuple[dict[str, Any], NDArray[np.bool_]]:
-    """Return what ``describe_runs`` does, if the study allows so many failures.
+    """Return the result of ``describe_runs``, if the failure rate is allowed.
+
+    Parameters
+    ----------
+    study : DescribedStudy
+        Checked study file.
+    model : Model
+        Model of the runs.
+    runs : DataFrame
+        Table of the runs.
+    block : int
+        Rows of a block, which is complete or left out as a whole.
 
     Raises
     ------

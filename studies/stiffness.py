@@ -1,4 +1,4 @@
-"""Stiffness from headform tests: a curve per test, the corridor of all, what HIC comes of it."""
+"""Stiffness from headform tests: a curve per test, the corridor of all, and the resulting HIC."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -63,6 +63,15 @@ class FittedTest:
 def fit_tests(data: Measured, *, knots: int = 6, quiet: bool = True) -> list[FittedTest]:
     """Fit every test of a set of headform tests and simulate it again with the fitted curve.
 
+    Parameters
+    ----------
+    data : Measured
+        Perpendicular headform tests.
+    knots : int
+        Maximum number of knots of a curve.
+    quiet : bool
+        No progress line.
+
     Raises
     ------
     UserError
@@ -77,7 +86,7 @@ def fit_tests(data: Measured, *, knots: int = 6, quiet: bool = True) -> list[Fit
     names = [str(name) for name in data.tests["test"]]
     for row, name in enumerate(follow(names, "tests fitted", quiet=quiet)):
         try:
-            # Of absurd tests come no finite numbers, which are told, not warned of.
+            # Absurd tests give non-finite numbers, which are reported without warnings.
             with np.errstate(all="ignore"):
                 fitted.append(_fit_test(data, row, name, knots))
         except ValueError as error:
@@ -120,7 +129,7 @@ def _fit_test(data: Measured, row: int, name: str, knots: int) -> FittedTest:
     since = time - fit.loop.onset
     rim = max(0.002, settling_time(header.channel_class or CHANNEL_CLASS))
     shown = (since > -rim) & (since < 1.6 * fit.loop.time[-1] + rim)
-    # With its sign: a filter swings below zero after the contact.
+    # Signed: a filtered signal undershoots after the contact.
     felt = head.channels["acceleration_normal"]
     simulated = np.interp(since, head.time, felt, left=0.0, right=0.0)
     pulse = Pulse(since[shown], values[shown], simulated[shown])
@@ -151,7 +160,17 @@ def _pulse_numbers(time: Array, acceleration: Array) -> dict[str, float]:
 
 
 def hic_corridor(corridor: Corridor, speed: float, mass: float) -> Array:
-    """Return HIC15 (21,) along the coordinates of a corridor for a headform test."""
+    """Return HIC15 (21,) along the coordinates of a corridor for a headform test.
+
+    Parameters
+    ----------
+    corridor : Corridor
+        Stiffness corridor.
+    speed : float
+        Impact speed in m/s.
+    mass : float
+        Headform mass in kg.
+    """
     values = []
     for coordinate in COORDINATES:
         curve = corridor.curve(float(coordinate))
@@ -177,13 +196,20 @@ def fit_stiffness_of(
 
     Parameters
     ----------
-    folder : measured data or ISO-MME.
-    out : results folder.
-    zone : name of the zone in the corridor file.
-    method : ``quantiles`` or ``components``, how the corridor is built.
-    knots : most knots of a curve.
-    channels : of ISO-MME tests, which to take; see
-        ``mcstudy.measurement.isomme.head_acceleration``.
+    folder : path
+        Measured data or ISO-MME tests.
+    out : ResultsFolder
+        Results folder.
+    zone : str
+        Name of the zone in the corridor file.
+    method : str
+        ``quantiles`` or ``components``: how the corridor is built.
+    knots : int
+        Maximum number of knots of a curve.
+    channels : sequence of str
+        Channels to take from ISO-MME tests; see ``mcstudy.measurement.isomme.head_acceleration``.
+    quiet : bool
+        No progress line.
 
     Returns
     -------
@@ -317,15 +343,15 @@ def _draw(
 
 
 def _filter_words(data: Measured) -> list[str]:
-    """Return how signals of a low channel class were fitted, and what their HIC is worth."""
+    """Return a note on the fit of signals of a low channel class, and on their HIC."""
     name = data.header.signals["head_acceleration"].filter
     if not 0.0 < data.header.signals["head_acceleration"].channel_class < CHANNEL_CLASS:
         return []
     return [
         f"The signals have passed {name}, which rounds flanks and peaks. Each law is therefore the "
         "one whose simulated acceleration, filtered alike, is the measured one; the grey loops "
-        "have what the filter took away added by it. Peak, 3 ms level and HIC15 below are those of "
-        f"the {name} signals, measured and simulated, and lower than CFC1000 would give them."
+        "include its estimate of what the filter removed. Peak, 3 ms level and HIC15 below are "
+        f"those of the {name} signals, measured and simulated, and lower than with CFC1000."
     ]
 
 
@@ -364,19 +390,19 @@ def _report(
         Section(
             "Fit",
             (
-                "The headform is taken as rigid and as not turning. Its filtered acceleration, "
+                "The headform is assumed to be rigid and not to rotate. Its filtered acceleration, "
                 "integrated twice from first contact, gives penetration; times its mass, force. "
                 "Knots and unloading line are fitted by least squares; intervals are 95 % and "
-                "count noise, speed and mass uncertainty, and the misfit of the curve.",
+                "include noise, speed and mass uncertainty, and the misfit of the curve.",
                 *_filter_words(data),
             ),
             [summary_table(analysis)],
             {"Measured loops (grey), fitted curves with 95 % intervals at the knots, and unloading "
              "lines (dashed).": figures["force_penetration"],
-             "What the fitted loading curves leave over.": figures["residuals"]},
+             "Residuals of the fitted loading curves.": figures["residuals"]},
         ),
         Section(
-            "And back",
+            "Forward check",
             (
                 "Each test simulated with its own fitted curve. The pulses differ by "
                 f"{100.0 * worst:.1f} % of the peak (root mean square) at worst.",
@@ -390,7 +416,7 @@ def _report(
         low, middle, high = (entry["hic15"][k] for k in (0, len(COORDINATES) // 2, -1))
         sections.append(
             Section(
-                "Corridor in, corridor out",
+                "Stiffness corridor and resulting HIC15",
                 (
                     f"From the curves of {len(tests)} tests by {entry['method']}: bounds hold nine "
                     f"curves in ten. HIC15 of the headform test goes from {number(low)} over "
@@ -399,13 +425,13 @@ def _report(
                     "headform model, or copy it into a vehicle file.",
                 ),
                 (),
-                {"Stiffness corridor, and the HIC15 corridor that comes of it.":
+                {"Stiffness corridor, and the resulting HIC15 corridor.":
                  figures["corridor"]},
             )
         )  # fmt: skip
     else:
-        sections.append(Section("Corridor", (f"A corridor takes {MIN_CURVES} tests or more.",)))
+        sections.append(Section("Corridor", (f"A corridor needs {MIN_CURVES} tests or more.",)))
     if analysis["notes"]:
-        sections.append(Section("What was read", analysis["notes"]))
+        sections.append(Section("Notes on the data", analysis["notes"]))
     subtitle = f"Stiffness from {len(tests)} headform tests in {data.source}"
     return render(data.header.title, subtitle, sections)

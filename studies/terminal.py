@@ -1,4 +1,4 @@
-"""What the command line prints: any text, on any terminal."""
+"""Printing of any text on any terminal."""
 
 import sys
 from collections.abc import Iterable, Sequence
@@ -9,7 +9,7 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 WIDEST = 10_000
-"""Columns where the output is no terminal: a file cuts nothing."""
+"""Columns where the output is not a terminal, so that no line is cut."""
 
 
 def accept_any_text(streams: Iterable[TextIO]) -> None:
@@ -20,26 +20,35 @@ def accept_any_text(streams: Iterable[TextIO]) -> None:
 
 
 def printable(text: str) -> str:
-    """Return a text without the characters that steer a terminal."""
+    """Return a text without terminal control characters."""
     return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
 def print_lines(lines: Iterable[str]) -> None:
-    """Print paragraphs; nothing in them is markup."""
+    """Print paragraphs as plain text, without markup."""
     console = _console()
     for line in lines:
         console.print(Text(printable(line)), soft_wrap=not console.is_terminal)
 
 
 def print_path(what: str, path: object) -> None:
-    """Print where something is, never broken."""
+    """Print a path without line breaks."""
     _console().print(Text(printable(f"{what}: {path}")), soft_wrap=True)
 
 
 def print_table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table of text, nothing in it markup.
+    """Print a table of plain text, without markup.
 
-    On a terminal long cells are folded; elsewhere lines are as long as it takes.
+    On a terminal long cells are folded; elsewhere lines are not broken.
+
+    Parameters
+    ----------
+    caption : str
+        Title of the table.
+    head : sequence of str
+        Column titles.
+    rows : iterable of sequence of str
+        Cells by row.
     """
     shown = RichTable(title=Text(printable(caption)) if caption else None)
     for name in head:

@@ -1,4 +1,4 @@
-"""What a worker process runs. It imports models only, no pandas, figures or reports."""
+"""Code of a worker process. It imports models only, no pandas, figures or reports."""
 
 import functools
 import json
@@ -23,7 +23,7 @@ class ModelArgument(TypedDict):
 
 @functools.lru_cache(maxsize=4)
 def _model(name: str, options: str, effects: str, version: str) -> Model:
-    # The version tells two states of a file that an option names apart.
+    # The version distinguishes two states of a file that an option names.
     return load_model(name, json.loads(options), json.loads(effects))
 
 
@@ -35,7 +35,7 @@ def evaluate(
     Parameters
     ----------
     argument : ModelArgument
-        Which model.
+        Name, options, effects and version of the model.
     rows : (n, d) array
         Inputs in the order of the model's.
     started : callable

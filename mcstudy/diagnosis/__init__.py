@@ -1,1 +1,1 @@
-"""Diagnosis: what a simulation gets wrong against measured tests, why, and what a cure gains."""
+"""Diagnosis of model discrepancy against measured tests: adequacy, causes, predictive gain."""

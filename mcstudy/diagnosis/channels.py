@@ -1,8 +1,7 @@
-"""Channels that are no evidence of their own, because they were computed from another one.
+"""Channels that are no independent evidence, because they were computed from another one.
 
-A force that is mass times acceleration, or a penetration that is its double integral, repeats what
-the accelerometer said. Two sensors never agree to a fraction of their noise; a computed channel
-does.
+A force that is mass times acceleration, or a penetration that is its double integral, repeats the
+accelerometer. Two sensors never agree within a fraction of their noise; a computed channel does.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,18 +17,22 @@ Array = NDArray[np.float64]
 TOO_WELL = 0.3
 """Share of the noise of both sensors below which two channels agree too well."""
 TOO_CLOSE = 0.1
-"""The same for a penetration, whose computed twin has hardly any noise."""
+"""The same for a penetration, whose computed copy has hardly any noise."""
 ACCELERATION = "head_acceleration"
 
 
 def computed_channels(
     tests: Sequence[Test], *, mass: str, speed: str, gravity: float
 ) -> Mapping[str, str]:
-    """Return the signals that were computed from the head acceleration, and how.
+    """Return the signals computed from the head acceleration, with the formula.
 
     Parameters
     ----------
-    tests : Tests. mass, speed : names of the inputs that hold them. gravity : m/s2 of one g.
+    tests : sequence of Test
+    mass, speed : str
+        Names of the inputs that hold mass (kg) and impact speed (m/s).
+    gravity : float
+        m/s2 of one g.
     """
     found = {}
     for name in {signal.name for test in tests for signal in test.signals} - {ACCELERATION}:
@@ -66,7 +69,7 @@ def _is_integral(acceleration: Signal, depth: Signal, speed: float, gravity: flo
     way = cumulative_trapezoid(rate, time, initial=0)
     twin = np.interp(depth.time, time, way)
     inside = depth.values > 0.05 * depth.values.max()
-    # Where integration began and the speed that it took are a straight line.
+    # An unknown start and initial speed of the integration add a straight line.
     basis = np.stack([np.ones(depth.time.size), depth.time], axis=1)[inside]
     rest = (depth.values - twin)[inside]
     line = np.linalg.lstsq(basis, rest, rcond=None)[0]

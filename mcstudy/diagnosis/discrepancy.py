@@ -1,7 +1,7 @@
-"""A Gaussian process for what a model misses: the baseline that names nothing.
+"""Gaussian-process model discrepancy: the baseline without a named cause.
 
 The discrepancy of a test is a sum of smooth shapes; the coefficient of each is a Gaussian process
-over the recorded inputs. Size and length are those that make the data most probable.
+over the recorded inputs. Size and length maximise the marginal likelihood.
 """
 
 import itertools
@@ -28,12 +28,15 @@ JITTER = 1e-8
 
 @dataclass(frozen=True)
 class Discrepancy:
-    """A fitted process.
+    """A fitted Gaussian process.
 
     Attributes
     ----------
-    centre, scale : of the recorded inputs, by name. points : (tests, inputs) scaled.
-    size, length : of the kernel. weights : (tests * shapes,) of the posterior mean.
+    names : recorded inputs that vary between tests.
+    centre, scale : mean and standard deviation of these inputs.
+    points : (tests, inputs) scaled inputs.
+    size, length : standard deviation and length scale of the kernel.
+    mean : (tests * shapes,) posterior mean of the coefficients.
     covariance : (tests * shapes, tests * shapes), posterior of the coefficients.
     shapes : number of shapes a test.
     """
@@ -53,7 +56,7 @@ class Discrepancy:
         return _plain(smooth_discrepancy(layouts, fitted)).columns
 
     def predict(self, layouts: Sequence[Layout]) -> tuple[list[Array], list[Array]]:
-        """Return mean (k,) and root (k, k) of the covariance of the coefficients, a test."""
+        """Return mean (k,) and covariance root (k, k) of the coefficients, one a test."""
         kernel = _kernel(self.points, self.points, self.size, self.length)
         kernel += JITTER * self.size**2 * np.eye(len(kernel))
         inverse = np.linalg.inv(kernel)
@@ -77,13 +80,18 @@ class Discrepancy:
 def fit_discrepancy(
     fitted: Fit, layouts: Sequence[Layout], shapes: Shapes, scatter: Scatter
 ) -> Discrepancy:
-    """Return the process that makes the tests of a fit most probable.
+    """Return the Gaussian process of greatest marginal likelihood.
 
     Parameters
     ----------
-    fitted : Fit of the base model, whose shared values are kept. layouts : of its tests.
-    shapes : smooth shapes; those that are the same in all tests are taken.
-    scatter : repeatability beside the process.
+    fitted : Fit
+        Fit of the base model; its shared values are kept.
+    layouts : sequence of Layout
+        Of its tests.
+    shapes : Shapes
+        Smooth shapes, of which those that are the same in all tests are used.
+    scatter : Scatter
+        Repeatability beside the process.
     """
     fitted = _with_shared_kept(fitted)
     plain = _plain(shapes)
@@ -112,7 +120,7 @@ def fit_discrepancy(
 
 
 def _with_shared_kept(fitted: Fit) -> Fit:
-    """Return a fit in whose linear model the shared values are known."""
+    """Return a fit whose linear model has known shared values."""
     empty = tuple(table[:, :0] for table in fitted.slopes.shared)
     return replace(
         fitted,

@@ -1,8 +1,8 @@
-"""Fit of a model with everything uncertain that is uncertain, and its evidence.
+"""Maximum a posteriori fit of a model with all its uncertain quantities, and its evidence.
 
-The most probable values of the shared unknowns, of a cause's parameters and of every test's own
-nuisances by Gauss-Newton; the matrix of slopes is block-arrow, so tests are eliminated one by one.
-The evidence is Laplace's approximation.
+Gauss-Newton finds the most probable values of the shared unknowns, of a cause's parameters and of
+every test's own nuisances; the Jacobian is block-arrow, so tests are eliminated one by one. The
+evidence is Laplace's approximation.
 """
 
 import functools
@@ -20,19 +20,25 @@ from mcstudy.studyfile.input_space import MAX_SCORE, value_at
 Array = NDArray[np.float64]
 
 SHARED_STEP, OWN_STEP = 0.1, 0.5
-"""Scores by which shared and a test's own values are moved for a slope."""
+"""Steps of finite differences, in latents: of shared values and of a test's own nuisances."""
 MAX_STEPS = 12
 CONVERGED = 0.05
-"""Expected gain in log units below which a fit is done."""
+"""Expected gain in log posterior below which a fit has converged."""
 LINEAR = 0.7
-"""Share of the expected gain from which slopes are good enough to go on with."""
+"""Achieved share of the expected gain above which the Jacobian is reused."""
 LONGEST = 1.5
-"""Largest move of a shared score in one step."""
+"""Largest move of a shared latent in one step."""
 
 
 @dataclass(frozen=True)
 class Slopes:
-    """Slopes that take runs, whitened, a test: (n, doubtful inputs) and (n, p)."""
+    """Whitened Jacobian blocks that take runs, one a test.
+
+    Attributes
+    ----------
+    doubtful : (n, doubtful inputs), in the recorded inputs with an uncertainty.
+    shared : (n, p), in the shared latents.
+    """
 
     doubtful: tuple[Array, ...]
     shared: tuple[Array, ...]
@@ -40,17 +46,20 @@ class Slopes:
 
 @dataclass(frozen=True)
 class Fit:
-    """A fit.
+    """A maximum a posteriori fit.
 
     Attributes
     ----------
-    forms : causes switched on. scatter : size of the repeatability.
-    scores : most probable.
-    observations : simulated tests there. slopes : that took runs.
-    residuals, own_slopes : (n,), (n, q) whitened, a test.
-    covariance : (p, p) of the shared scores.
+    forms : causes switched on.
+    scatter : size of the repeatability.
+    scores : most probable standard-normal latents.
+    observations : simulated tests at those latents.
+    slopes : Jacobian blocks that take runs.
+    residuals : (n,) whitened, one a test.
+    own_slopes : (n, q) whitened Jacobian in the test's own nuisances, one a test.
+    covariance : (p, p) posterior covariance of the shared latents.
     log_evidence : up to a constant that all fits of the same data share.
-    misfit : half the sum of squares of residuals and scores.
+    misfit : negative log posterior, half the sum of squares of residuals and latents.
     """
 
     forms: tuple[Form, ...]
@@ -66,12 +75,12 @@ class Fit:
 
     @property
     def shared_slopes(self) -> tuple[Array, ...]:
-        """Slopes (n, p) whitened, a test."""
+        """Whitened Jacobian (n, p) in the shared latents, one a test."""
         return self.slopes.shared
 
 
 class FitError(Exception):
-    """A model run failed where the fit began."""
+    """A model run failed at the start of the fit."""
 
 
 def shared_names(problem: Problem, forms: Sequence[Form]) -> list[str]:
@@ -83,7 +92,7 @@ def shared_names(problem: Problem, forms: Sequence[Form]) -> list[str]:
 
 @dataclass(frozen=True)
 class _Common:
-    """What all tests share at some scores: values of unknowns, parameters of effects by cause."""
+    """Values that all tests share: unknowns, and parameters of effects by cause."""
 
     unknowns: dict[str, float]
     effects: dict[str, dict[str, float]]
@@ -111,7 +120,16 @@ def _observe(problem: Problem, common: _Common, layout: Layout, own: Array) -> O
 def observe_tests(
     problem: Problem, forms: Sequence[Form], layouts: Sequence[Layout], scores: Scores
 ) -> list[Observation] | None:
-    """Return the simulated tests at scores; None if a run fails."""
+    """Return the simulated tests; None if a run fails.
+
+    Parameters
+    ----------
+    problem : Problem
+    forms : sequence of Form
+    layouts : sequence of Layout
+    scores : Scores
+        Latents to simulate at.
+    """
     common = _common(problem, forms, scores.shared)
     found = []
     for layout, own in zip(layouts, scores.own, strict=True):
@@ -123,7 +141,7 @@ def observe_tests(
 
 
 def start_scores(layouts: Sequence[Layout], shared: int) -> Scores:
-    """Return scores of zero."""
+    """Return latents of zero, the prior medians."""
     return Scores(np.zeros(shared), tuple(np.zeros(len(layout.names)) for layout in layouts))
 
 
@@ -139,17 +157,26 @@ def fit(
     weight: float = 1.0,
     most: int = MAX_STEPS,
 ) -> Fit:
-    """Return the most probable fit near a start.
+    """Return the maximum a posteriori fit near a start.
 
-    Slopes are simulated anew only while the model is not as linear as they say.
+    The Jacobian is recomputed only where the linear model predicts too little of the gain.
 
     Parameters
     ----------
-    known : slopes from a fit near by, to begin with; the last form's may be missing.
-    exact : whether the slopes must be those of the most probable scores in the end.
-    weight : of the data against the priors; below 1 a misfit is taken less seriously, so that a
-        fit from far away does not end in the wrong valley.
-    most : steps.
+    problem : Problem
+    layouts : sequence of Layout
+    forms : sequence of Form
+    start : Scores
+    scatter : Scatter
+    known : Slopes, optional
+        Jacobian of a nearby fit, to begin with; columns of the last form may be missing.
+    exact : bool
+        Whether the final Jacobian must be that of the most probable latents.
+    weight : float
+        Weight of the data against the priors; below 1 it tempers the likelihood, so that a fit from
+        far away does not end in a wrong local optimum.
+    most : int
+        Largest number of steps.
 
     Raises
     ------
@@ -160,7 +187,7 @@ def fit(
     scores = start
     seen = observe_tests(problem, forms, layouts, scores)
     if seen is None:
-        raise FitError("a run fails where the fit begins")
+        raise FitError("a run fails at the start of the fit")
     misfit = _misfit(layouts, seen, scores, scatter, weight)
     slopes, fresh, simulated = known, False, known is None
     if known is not None and known.shared[0].shape[1] < scores.shared.size:
@@ -205,7 +232,15 @@ def fit(
 
 @dataclass(frozen=True)
 class Centre:
-    """A model linearised at scores: residuals (n,), slopes that took runs, own (n, q), a test."""
+    """A model linearised at a point.
+
+    Attributes
+    ----------
+    scores : latents of the point.
+    residuals : (n,) whitened, one a test.
+    slopes : Jacobian blocks that take runs.
+    own_slopes : (n, q) whitened Jacobian in the test's own nuisances, one a test.
+    """
 
     scores: Scores
     residuals: tuple[Array, ...]
@@ -213,7 +248,7 @@ class Centre:
     own_slopes: tuple[Array, ...]
 
     def equations(self, weight: float) -> NormalEquations:
-        """Return the normal equations at a weight of the data, made once."""
+        """Return the normal equations at a weight of the data, cached."""
         if weight not in self._made:
             self._made[weight] = NormalEquations(self.own_slopes, self.slopes.shared, weight)
         return self._made[weight]
@@ -230,7 +265,17 @@ def linearise(
     scores: Scores,
     scatter: Scatter,
 ) -> Centre | None:
-    """Return the model linearised at scores; None if a run fails there."""
+    """Return the linearised model; None if a run fails.
+
+    Parameters
+    ----------
+    problem : Problem
+    layouts : sequence of Layout
+    forms : sequence of Form
+    scores : Scores
+        Latents to linearise at.
+    scatter : Scatter
+    """
     seen = observe_tests(problem, forms, layouts, scores)
     if seen is None:
         return None
@@ -246,7 +291,17 @@ def residuals_at(
     scores: Scores,
     scatter: Scatter,
 ) -> tuple[Array, ...] | None:
-    """Return the whitened residuals (n,) of every test at scores; None if a run fails."""
+    """Return the whitened residuals (n,) of every test; None if a run fails.
+
+    Parameters
+    ----------
+    problem : Problem
+    layouts : sequence of Layout
+    forms : sequence of Form
+    scores : Scores
+        Latents to simulate at.
+    scatter : Scatter
+    """
     seen = observe_tests(problem, forms, layouts, scores)
     if seen is None:
         return None
@@ -257,9 +312,15 @@ def residuals_at(
 
 
 def solve(centre: Centre, residuals: Sequence[Array], weight: float) -> tuple[Scores, float]:
-    """Return the scores that suit residuals best in the linear model, and the misfit there.
+    """Return the most probable latents of the linear model and their negative log posterior.
 
-    ``weight`` is that of the data against the priors.
+    Parameters
+    ----------
+    centre : Centre
+    residuals : sequence of (n,) array
+        Whitened, one a test.
+    weight : float
+        Weight of the data against the priors.
     """
     planned = centre.equations(weight).solve(residuals, centre.scores)
     own = tuple(z + d for z, d in zip(centre.scores.own, planned.move.own, strict=True))
@@ -291,7 +352,17 @@ def expand_tests(
     slopes: Slopes,
     scatter: Scatter,
 ) -> tuple[list[Array], list[Array]]:
-    """Return residuals (n,) and slopes (n, q) in the tests' own nuisances, whitened, a test."""
+    """Return residuals (n,) and Jacobians (n, q) in the tests' own nuisances, whitened.
+
+    Parameters
+    ----------
+    layouts : sequence of Layout
+    seen : sequence of Observation
+    scores : Scores
+        Latents that they were simulated at.
+    slopes : Slopes
+    scatter : Scatter
+    """
     residuals, owns = [], []
     for layout, observation, own, doubtful in zip(
         layouts, seen, scores.own, slopes.doubtful, strict=True
@@ -311,9 +382,9 @@ def _simulate_slopes(
     scatter: Scatter,
     known: Slopes | None = None,
 ) -> Slopes:
-    """Return the slopes that take runs, by a step to whichever side runs.
+    """Return the Jacobian blocks that take runs, by one-sided differences to a side that runs.
 
-    Those that are known already are kept; the shared ones that are missing come last.
+    Known blocks are kept; missing shared columns come last.
     """
     residuals = [
         layout.residual(observation, own, scatter)
@@ -352,7 +423,7 @@ def _doubtful(
     residuals: Sequence[Array],
     scatter: Scatter,
 ) -> tuple[Array, ...]:
-    """Return the slopes in the inputs that are recorded with an uncertainty."""
+    """Return the Jacobians in the inputs that are recorded with an uncertainty."""
     tables = []
     for layout, own, residual in zip(layouts, scores.own, residuals, strict=True):
         table = np.zeros((residual.size, len(layout.test.doubtful)))
@@ -378,7 +449,7 @@ def _descend(
     misfit: float,
     weight: float,
 ) -> tuple[Scores, list[Observation], float] | None:
-    """Return scores that fit better along the step, with what was seen there."""
+    """Return more probable latents along the step, their simulated tests and log posterior."""
     longest = float(np.abs(move.shared).max(initial=0.0))
     share = min(1.0, LONGEST / longest) if longest > 0.0 else 1.0
     for _ in range(6):

@@ -1,8 +1,8 @@
-"""What an extended model gains on tests that it has not seen.
+"""Predictive gain of an extended model on held-out tests.
 
 Whole tests are held out, never samples of them. Three predictions are scored: the base model, the
-extended one, and the base model with a Gaussian-process discrepancy, which fits a misfit and names
-nothing (M. Kennedy, A. O'Hagan, J. R. Stat. Soc. B 63:425, 2001).
+extended one, and the base model with a Gaussian-process discrepancy, which fits a misfit without
+a named cause (M. Kennedy, A. O'Hagan, J. R. Stat. Soc. B 63:425, 2001).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +22,7 @@ from mcstudy.statistics import Estimate
 
 Array = NDArray[np.float64]
 Quantity = Callable[[Array, Array], float]
-"""Time (s) and values of a signal to a number, such as HIC15."""
+"""Maps time (s) and values of a signal to a number, such as HIC15."""
 
 FOLDS = 6
 DRAWS = 200
@@ -34,14 +34,16 @@ MODELS = ("base", "extended", "gaussian_process")
 
 @dataclass(frozen=True)
 class Gain:
-    """A score of the three predictions; smaller is better for all but the log score.
+    """A predictive score of the three models; smaller is better for all but the log score.
 
     Attributes
     ----------
-    score : its name. region : ``inside`` or ``beyond`` the regime of the tests that were used.
-    unit : of the score. base, extended, gaussian_process : means over the held-out tests.
+    score : its name.
+    region : ``inside`` or ``beyond`` the regime of the tests that were used.
+    unit : of the score.
+    base, extended, gaussian_process : means over the held-out tests.
     difference : extended against base, positive if better, with its interval.
-    against_process : the same against the Gaussian process.
+    against_process : extended against the Gaussian process, likewise.
     relative : difference over the base's score.
     """
 
@@ -58,7 +60,7 @@ class Gain:
 
 @dataclass(frozen=True)
 class _Prediction:
-    """Of one test, whitened: mean (n,) and factor (n, k) of the covariance beside the noise."""
+    """Prediction of one test, whitened: mean (n,), covariance factor (n, k) without noise."""
 
     mean: Array
     factor: Array
@@ -76,9 +78,15 @@ def measure_gain(
 
     Parameters
     ----------
-    base, extended : fits to all tests.
-    quantities : unit, signal and function by name.
-    seed : of the draws.
+    problem : Problem
+    layouts : sequence of Layout
+        Of all tests.
+    base, extended : Fit
+        Fits to all tests.
+    quantities : mapping
+        Unit, signal and function by name.
+    seed : int
+        Of folds and draws.
     """
     rng = np.random.default_rng(seed)
     count = len(layouts)
@@ -103,7 +111,7 @@ def _top(layouts: Sequence[Layout]) -> NDArray[np.int64]:
 
 
 Scored = dict[str, dict[str, list[float]]]
-"""By score and model the values of the held-out tests."""
+"""Values of the held-out tests by score and model."""
 
 
 def _score(
@@ -131,10 +139,10 @@ def _score(
         if plain is None or blank is None:
             continue
         shapes = smooth_discrepancy(part, plain)
-        # What the process explains is not repeatability.
+        # Repeatability beside the discrepancy that the process explains.
         calm = estimate_scatter(plain, part, shapes)
         process = fit_discrepancy(plain, part, shapes, calm)
-        # The same noise for all three, so that their differences are not of the draws.
+        # Common random numbers for all three, so that differences are free of sampling noise.
         seeds = rng.integers(2**32, size=held.size)
         for name in MODELS:
             kind, whole = ("extended", extended) if name == "extended" else ("base", base)
@@ -152,7 +160,7 @@ def _score(
 
 
 def _of_tests(whole: Fit, chosen: NDArray[np.int64]) -> Fit:
-    """Return what a fit says of some of its tests."""
+    """Return a fit restricted to some of its tests."""
     return replace(
         whole,
         scores=Scores(whole.scores.shared, tuple(whole.scores.own[i] for i in chosen)),
@@ -167,7 +175,7 @@ def _of_tests(whole: Fit, chosen: NDArray[np.int64]) -> Fit:
 
 
 def _train(problem: Problem, layouts: Sequence[Layout], whole: Fit, kept: NDArray[np.int64]) -> Fit:
-    """Return a fit to some of the tests, from that to all."""
+    """Return a fit to some of the tests, started from the fit to all."""
     part = replace(problem, tests=tuple(problem.tests[i] for i in kept))
     known = _of_tests(whole, kept)
     places = [layouts[i] for i in kept]
@@ -177,7 +185,7 @@ def _train(problem: Problem, layouts: Sequence[Layout], whole: Fit, kept: NDArra
 def _untouched(problem: Problem, places: Sequence[Layout], fitted: Fit) -> Fit | None:
     """Return a fit with its tests' own nuisances at zero; None if a run fails.
 
-    Where a model is far off they are far away: what they take up must not be extrapolated.
+    Nuisances of a wrong model absorb its misfit, which must not be extrapolated.
     """
     scores = Scores(fitted.scores.shared, tuple(np.zeros(len(place.names)) for place in places))
     seen = observe_tests(problem, fitted.forms, places, scores)
@@ -197,7 +205,7 @@ def _predict(
     whole: Fit,
     held: Sequence[int] | NDArray[np.int64],
 ) -> list[_Prediction] | None:
-    """Return predictions of held-out tests, their own nuisances unknown."""
+    """Return predictions of held-out tests, own nuisances at their priors."""
     places = [layouts[i] for i in held]
     own = tuple(np.zeros(len(place.names)) for place in places)
     seen = observe_tests(problem, trained.forms, places, Scores(trained.scores.shared, own))
@@ -220,7 +228,7 @@ def _corrected(
     process: Discrepancy,
     calm: Scatter,
 ) -> list[_Prediction]:
-    """Return predictions with the Gaussian process added, and the repeatability beside it.
+    """Return predictions with the Gaussian process added, and its own repeatability.
 
     ``blank`` is the base model of the same tests, their own nuisances at zero.
     """
@@ -240,7 +248,7 @@ def _corrected(
 
 
 def _calmed(layout: Layout, base: Fit, prediction: _Prediction, calm: Scatter) -> Array:
-    """Return what the columns of a factor are multiplied by for another repeatability."""
+    """Return the factors on the columns of a covariance factor for another repeatability."""
     scale = np.ones(prediction.factor.shape[1])
     own = scale[: layout.scattering.size]
     own[layout.scattering] = layout.scatter_sizes(calm) / layout.scatter_sizes(base.scatter)
@@ -348,7 +356,7 @@ def _mean(values: Array, score: str) -> Array:
 def _better(
     ours: Array, theirs: Array, score: str, rows: NDArray[np.int64], *, relative: bool = False
 ) -> Estimate:
-    """Return by how much our score is better, with a paired bootstrap interval."""
+    """Return the improvement of a score with a paired bootstrap interval."""
     sign = 1.0 if score == "log_score" else -1.0
 
     def gain(mine: Array, other: Array) -> Array:

@@ -1,8 +1,8 @@
-"""What is measured of one test as one vector, and what may be off in it.
+"""The measured data of one test as one vector, and the nuisances of the test.
 
-A test's own nuisances are, in this order: the inputs that are recorded with an uncertainty, the
+The nuisances of a test are, in this order: the inputs that are recorded with an uncertainty, the
 time origin, the offset of each signal, and the repeatability of the pulse: a few smooth factors in
-time and one a scalar. All are scores; ``NUISANCE`` holds their standard deviations.
+time and one factor a scalar. All are standard-normal latents.
 """
 
 import functools
@@ -33,19 +33,20 @@ LEAD = 5e-3
 
 @dataclass(frozen=True)
 class Scatter:
-    """Size of the repeatability, relative.
+    """Relative size of the test-to-test repeatability.
 
     Attributes
     ----------
-    level : of the whole pulse and of scalars.
-    shape : of the slowest cosine; the k-th has 1/k^2 of it, as those of a smooth function do.
+    level : standard deviation of the whole pulse and of scalars, relative.
+    shape : standard deviation of the slowest cosine, relative; the k-th has 1/k^2 of it, as the
+        coefficients of a smooth function do.
     """
 
     level: float
     shape: float
 
     def sizes(self, modes: int, scalars: int) -> Array:
-        """Return the sizes of modes of the pulse, then of scalars."""
+        """Return the standard deviations of the modes of the pulse, then of the scalars."""
         waves = [self.shape / k**2 for k in range(1, modes)]
         return np.array([*([self.level] if modes else []), *waves, *[self.level] * scalars])
 
@@ -55,11 +56,13 @@ NO_SCATTER = Scatter(0.0, 0.0)
 
 @dataclass(frozen=True)
 class Layout:
-    """The vector of a test.
+    """The data vector of a test.
 
     Attributes
     ----------
-    test : Test. shift : s, of its time origin. window : s, begin and end of the pulse.
+    test : the measured test.
+    shift : s, shift of its time origin.
+    window : s, begin and end of the pulse.
     """
 
     test: Test
@@ -79,11 +82,11 @@ class Layout:
 
     @functools.cached_property
     def scattering(self) -> NDArray[np.bool_]:
-        """Which nuisances are repeatability."""
+        """Which nuisances describe the repeatability."""
         return np.array([name.startswith(("pulse:", "scatter:")) for name in self.names])
 
     def scatter_sizes(self, scatter: Scatter) -> Array:
-        """Return the sizes of the nuisances that are repeatability, in order."""
+        """Return the standard deviations of the repeatability nuisances, in order."""
         scalars = sum(scalar.scatters for scalar in self.test.scalars)
         return scatter.sizes(MODES if self.test.signals else 0, scalars)
 
@@ -93,7 +96,7 @@ class Layout:
         return tuple(self.modes(signal.time) for signal in self.test.signals)
 
     def inputs(self, scores: Array, ranges: Mapping[str, tuple[float, float]]) -> dict[str, float]:
-        """Return the inputs of the test at scores of its nuisances."""
+        """Return the inputs of the test at the latents of its nuisances."""
         values = dict(self.test.inputs)
         for (name, sd), score in zip(self.test.doubtful.items(), scores, strict=False):
             low, high = ranges[name]
@@ -107,32 +110,80 @@ class Layout:
         return np.asarray(np.cos(np.pi * phase[:, None] * np.arange(MODES)))
 
     def residual(self, seen: Observation, scores: Array, scatter: Scatter) -> Array:
-        """Return the whitened difference of measured and simulated, (n,)."""
+        """Return the whitened difference of measured and simulated data.
+
+        Parameters
+        ----------
+        seen : Observation
+            Simulated test.
+        scores : (q,) array
+            Latents of the test's nuisances.
+        scatter : Scatter
+            Size of the repeatability.
+
+        Returns
+        -------
+        (n,) array
+        """
         return self._assemble(seen, scores, scatter)[0]
 
     def expand(self, seen: Observation, scores: Array, scatter: Scatter) -> tuple[Array, Array]:
-        """Return the whitened residual (n,) and its slope (n, k) in the nuisances but the inputs.
+        """Return the whitened residual and the analytic Jacobian of the simulated vector.
 
-        The slope is that of the simulated vector.
+        Parameters
+        ----------
+        seen : Observation
+            Simulated test.
+        scores : (q,) array
+            Latents of the test's nuisances.
+        scatter : Scatter
+            Size of the repeatability.
+
+        Returns
+        -------
+        residual : (n,) array
+        jacobian : (n, k) array
+            In the nuisances other than the recorded inputs.
         """
         residual, columns = self._assemble(seen, scores, scatter, slope=True)
         assert columns is not None
         return residual, columns
 
     def whitened(self, seen: Observation, scores: Array) -> Array:
-        """Return the simulated vector, whitened, without repeatability."""
+        """Return the whitened simulated vector (n,) without repeatability."""
         return -self._assemble(
             seen, np.where(self.scattering, 0.0, scores), NO_SCATTER, measured=False
         )[0]
 
     def simulated(self, seen: Observation, scores: Array, scatter: Scatter) -> Array:
-        """Return the simulated vector, whitened, with everything that the scores say."""
+        """Return the whitened simulated vector with all nuisances applied.
+
+        Parameters
+        ----------
+        seen : Observation
+            Simulated test.
+        scores : (q,) array
+            Latents of the test's nuisances.
+        scatter : Scatter
+            Size of the repeatability.
+
+        Returns
+        -------
+        (n,) array
+        """
         return -self._assemble(seen, scores, scatter, measured=False)[0]
 
     def cosine(self, signal: str, order: int, seen: Observation | None) -> Array:
         """Return a cosine over the pulse of one signal, whitened (n,).
 
-        It is as high as the signal's peak, or has the shape of a simulated one.
+        Parameters
+        ----------
+        signal : str
+            Name of the signal.
+        order : int
+            Half periods over the pulse.
+        seen : Observation or None
+            Simulated test whose signal it is multiplied with; None scales it to the measured peak.
         """
         parts = []
         begin, end = self.window
@@ -151,7 +202,17 @@ class Layout:
         return np.concatenate([*parts, np.zeros(len(self.test.scalars))])
 
     def part(self, signal: str, window: int, windows: int) -> Array:
-        """Return one of equal parts of the pulse, as high as the peak, whitened (n,)."""
+        """Return a box over one of equal parts of the pulse, as high as the peak, whitened (n,).
+
+        Parameters
+        ----------
+        signal : str
+            Name of the signal.
+        window : int
+            Number of the part, from 0.
+        windows : int
+            Number of parts.
+        """
         parts = []
         begin, end = self.window
         for channel in self.test.signals:
@@ -163,7 +224,7 @@ class Layout:
         return np.concatenate([*parts, np.zeros(len(self.test.scalars))])
 
     def unwhiten(self, vector: Array) -> dict[str, Array]:
-        """Return a whitened vector (n,) as signals in their units, by name."""
+        """Return the signals of a whitened vector (n,) in their units, by name."""
         found = {}
         start = 0
         for channel in self.test.signals:
@@ -176,7 +237,7 @@ class Layout:
         return found
 
     def unit_scalar(self, name: str) -> Array:
-        """Return a scalar as large as it was measured, alone in the vector, whitened (n,)."""
+        """Return the whitened vector (n,) that holds one measured scalar and zeros elsewhere."""
         size = sum(signal.time.size for signal in self.test.signals)
         own = [s.value / s.sd if s.name == name else 0.0 for s in self.test.scalars]
         return np.concatenate([np.zeros(size), own])
@@ -233,7 +294,7 @@ class Layout:
 
 
 def _whiten(table: Array, sd: float, correlation: float) -> Array:
-    """Return (n, k) columns over the noise, neighbours decorrelated."""
+    """Return (n, k) columns divided by the noise, neighbouring samples decorrelated."""
     scaled = table / sd
     if correlation == 0.0:
         return scaled
@@ -242,12 +303,12 @@ def _whiten(table: Array, sd: float, correlation: float) -> Array:
 
 
 def lay_out(test: Test, seen: Observation) -> Layout:
-    """Return the layout of a test, its pulse and time origin found with a first simulation."""
+    """Return the layout of a test; pulse and time origin come from a first simulation."""
     if not test.signals:
         return Layout(test, 0.0, (0.0, 1.0))
     signal = test.signals[0]
     time, values = seen.signals[signal.name]
-    # A simulation may go on for longer than a test was recorded, to impacts of its own.
+    # A simulation may last longer than the record and contain later impacts.
     recorded = time - time[0] <= signal.time[-1] - signal.time[0] + LEAD
     time, values = time[recorded], values[recorded]
     large = np.flatnonzero(np.abs(values) >= PULSE * np.abs(values).max())
@@ -259,7 +320,7 @@ def lay_out(test: Test, seen: Observation) -> Layout:
 
 
 def _shift(time: Array, values: Array, model_time: Array, model_values: Array) -> float:
-    """Return by how much (s) a measured signal is later than a simulated one."""
+    """Return the delay (s) of a measured signal relative to a simulated one."""
     step = max(float(np.median(np.diff(time))), BIN)
     measured = np.interp(np.arange(time[0], time[-1], step), time, values)
     model = np.interp(np.arange(model_time[0], model_time[-1], step), model_time, model_values)

@@ -1,8 +1,7 @@
-"""The linear model about a fit, nuisances integrated out: scores and information of any shape.
+"""The linear model about a fit with nuisances integrated out: score and information of any shape.
 
-Tests are independent but for the shared values, so everything follows from one Gram matrix a test
-of its slopes and of the shapes that are asked about. Many simulated data sets cost one matrix
-product.
+Tests are independent given the shared values, so everything follows from one Gram matrix a test
+of its Jacobian and of the shapes asked about. Many simulated data sets cost one matrix product.
 """
 
 from collections.abc import Sequence
@@ -18,8 +17,8 @@ Array = NDArray[np.float64]
 
 
 FREEDOM = 5.0
-"""Degrees of freedom of a test's repeatability in simulated data (assumed: now and then a test is
-an odd one, more often than normal scatter has it)."""
+"""Degrees of freedom of a test's repeatability in simulated data (assumed: outlying tests occur
+more often than under normal scatter)."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,8 @@ class Reduced:
 
     Attributes
     ----------
-    information : (m, m) of the shapes. score : (d, m) of d data sets.
+    information : (m, m) Fisher information of the shapes.
+    score : (d, m) score vectors of d data sets.
     log_likelihood : (d,) of the data without the shapes, up to a constant.
     """
 
@@ -42,7 +42,11 @@ class Marginal:
 
     Parameters
     ----------
-    fitted : Fit. layouts : of its tests. shapes : (n, m) whitened, a test.
+    fitted : Fit
+    layouts : sequence of Layout
+        Of its tests.
+    shapes : sequence of (n, m) array
+        Whitened, one a test.
     """
 
     def __init__(self, fitted: Fit, layouts: Sequence[Layout], shapes: Sequence[Array]) -> None:
@@ -56,14 +60,14 @@ class Marginal:
             strict=True,
         ):  # fmt: skip
             table = np.concatenate([own, shared, shape], axis=1)
-            # Residual at scores of zero, in the linear model.
+            # Residual at latents of zero, in the linear model.
             whole = residual + own @ z + shared @ fitted.scores.shared
             self._gram.append(table.T @ table)
             self._product.append((table.T @ whole)[None])
 
     @property
     def squares(self) -> Array:
-        """Sums of squares (m,) of the shapes as they are."""
+        """Sums of squares (m,) of the shapes before nuisances are integrated out."""
         first = self._scattering[0].size + self._shared
         return np.asarray(sum(np.diag(gram)[first:] for gram in self._gram))
 
@@ -72,7 +76,16 @@ class Marginal:
         return self._product
 
     def draw(self, count: int, scatter: Scatter, rng: np.random.Generator) -> list[Array]:
-        """Return products (count, k) of data sets that the model without shapes makes."""
+        """Return products (count, k) of data sets drawn from the model without shapes.
+
+        Parameters
+        ----------
+        count : int
+            Number of data sets.
+        scatter : Scatter
+            Size of the repeatability to draw with.
+        rng : Generator
+        """
         common = rng.standard_normal((count, self._shared))
         products = []
         for gram, scale, layout in zip(
@@ -90,7 +103,7 @@ class Marginal:
         return products
 
     def reduce(self, products: Sequence[Array], scatter: Scatter) -> Reduced:
-        """Return the shapes with nuisances integrated out, at a size of the repeatability."""
+        """Return the shapes with nuisances integrated out, at a given repeatability."""
         p = self._shared
         rest = self._gram[0].shape[0] - self._scattering[0].size
         information = np.zeros((rest, rest))
@@ -120,7 +133,7 @@ class Marginal:
         )
 
     def _scales(self, scatter: Scatter) -> list[Array]:
-        """Return what each nuisance's slope is multiplied by for another repeatability."""
+        """Return the factors on each nuisance's Jacobian column for another repeatability."""
         scales = []
         for layout in self._layouts:
             scale = np.ones(layout.scattering.size)
@@ -131,11 +144,16 @@ class Marginal:
 
 
 def log_bayes_factor(information: Array, score: Array, size: float = 1.0) -> Array:
-    """Return the log evidence that shapes with coefficients N(0, size^2) add, (d,).
+    """Return the log Bayes factor (d,) of shapes with coefficients N(0, size^2).
 
     Parameters
     ----------
-    information : (m, m). score : (d, m).
+    information : (m, m) array
+        Fisher information of the shapes.
+    score : (d, m) array
+        Score vectors of d data sets.
+    size : float
+        Prior standard deviation of a coefficient.
     """
     values, vectors = np.linalg.eigh(information)
     values = np.maximum(values, 0.0)
@@ -145,7 +163,7 @@ def log_bayes_factor(information: Array, score: Array, size: float = 1.0) -> Arr
 
 
 def quadratic_form(information: Array, score: Array) -> tuple[Array, int]:
-    """Return the explained sum of squares (d,) of shapes and their rank."""
+    """Return the sum of squares (d,) that shapes explain, and their rank."""
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     values, vectors = np.linalg.eigh(information / scale[:, None] / scale)
     kept = values > 1e-6 * values.max(initial=0.0)

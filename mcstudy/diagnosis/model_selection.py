@@ -1,4 +1,4 @@
-"""Which cause: every one refitted in all its forms, ranked by evidence, with an open set."""
+"""Model selection: every cause refitted in all its forms, ranked by evidence, with an open set."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -34,34 +34,34 @@ from mcstudy.execution.workers import run_jobs
 Array = NDArray[np.float64]
 
 DISTINCT = 3.0
-"""Log units of evidence within which causes cannot be told apart, and below which none is named."""
+"""Log evidence within which causes are indistinguishable, and below which none is named."""
 STRUCTURE = 0.01
-"""p-value below which a fit leaves structure behind."""
+"""p-value below which the residuals of a fit have structure."""
 MAX_SHARE = 0.8
-"""Share of the explained misfit from which a cause is named although something remains."""
+"""Explained share of the misfit above which a cause is named despite remaining structure."""
 SCAN = Scatter(0.02, 0.02)
 """Repeatability with which forms are tried before it is estimated."""
 UNSEEN = 0.05
-"""Sum of squares over the noise below which a form changes nothing that was measured."""
+"""Whitened sum of squares below which a form changes nothing that was measured."""
 FAR = 0.7
-"""Weight of the data below which a fit begins far away."""
+"""Weight of the data below which a fit starts far from the data."""
 MAX_START = 3.0
-"""Score beyond which no fit begins."""
+"""Largest latent, in size, that a fit starts from."""
 CLOSE, WORSE = 60.0, 1.4
 """Log units and factor by which a form far from the data may fit worse than the best."""
 MODEST, SLIGHT = 4.0, 6.0
-"""Factor and log units by which a form near the data may promise less than the best."""
+"""Factor and log units by which a form near the data may promise less gain than the best."""
 PRUNING_RATIO = 1.5
-"""Factor on the best misfit beyond which a form is not fitted any further."""
+"""Factor on the best negative log posterior beyond which a form is pruned."""
 STAGE_STEPS = 6
 """Steps of a first fit."""
 MIN_COUNT = 6
-"""Forms that are refitted whatever they promise."""
+"""Forms that are refitted whatever their expected gain."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A cause with its best fit and its evidence above the base model's, forms averaged."""
+    """A cause with its best fit and log Bayes factor over the base model, averaged over forms."""
 
     cause: Cause
     fitted: Fit
@@ -72,7 +72,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Remainder:
-    """What a fit leaves behind: p-value, share of the misfit explained, best drift."""
+    """Remaining structure of a fit: p-value, share of the misfit explained, best drift."""
 
     p_value: float
     share: float
@@ -80,7 +80,16 @@ class Remainder:
 
 
 def settle(problem: Problem, layouts: Sequence[Layout], fitted: Fit) -> Fit:
-    """Return a fit with the repeatability that makes its data most probable."""
+    """Return a fit with its repeatability re-estimated.
+
+    Parameters
+    ----------
+    problem : Problem
+    layouts : sequence of Layout
+        Of the tests.
+    fitted : Fit
+        Fit to start from.
+    """
     for last in (False, True):
         scatter = estimate_scatter(fitted, layouts, None)
         start = rescale(layouts, fitted, scatter)
@@ -91,7 +100,18 @@ def settle(problem: Problem, layouts: Sequence[Layout], fitted: Fit) -> Fit:
 def with_given_scatter(
     problem: Problem, layouts: Sequence[Layout], fitted: Fit, scatter: Scatter
 ) -> Fit:
-    """Return a fit with another repeatability: what a misfit was taken for is none of it."""
+    """Return a fit with a given repeatability, so that it does not absorb a misfit.
+
+    Parameters
+    ----------
+    problem : Problem
+    layouts : sequence of Layout
+        Of the tests.
+    fitted : Fit
+        Fit to start from.
+    scatter : Scatter
+        Repeatability to use.
+    """
     if scatter == fitted.scatter:
         return fitted
     start = rescale(layouts, fitted, scatter)
@@ -99,7 +119,16 @@ def with_given_scatter(
 
 
 def rescale(layouts: Sequence[Layout], fitted: Fit, scatter: Scatter) -> Scores:
-    """Return a fit's scores for another repeatability, the pulses unchanged as far as plausible."""
+    """Return a fit's latents for another repeatability; the pulses stay the same within +-3.
+
+    Parameters
+    ----------
+    layouts : sequence of Layout
+        Of the tests.
+    fitted : Fit
+    scatter : Scatter
+        Repeatability to rescale to.
+    """
     own = []
     for layout, scores in zip(layouts, fitted.scores.own, strict=True):
         moved = scores.copy()
@@ -111,14 +140,15 @@ def rescale(layouts: Sequence[Layout], fitted: Fit, scatter: Scatter) -> Scores:
 
 @dataclass(frozen=True)
 class Survey:
-    """A form tried over its prior.
+    """Result of a prior grid scan of a form.
 
     Attributes
     ----------
-    form : Form. weight : of the data: the larger the misfit without the form, the less.
-    misfit : of the most promising start.
-    promise : log units that the form would gain if only its size were free.
-    starts : scores to start from with slopes near by, most promising first.
+    form : the form that was scanned.
+    weight : of the data; the larger the misfit without the form, the smaller.
+    misfit : negative log posterior at the best start.
+    promise : expected gain in log posterior if only the size of the form were free.
+    starts : latents to start from, with nearby Jacobians, best first.
     """
 
     form: Form
@@ -129,7 +159,7 @@ class Survey:
 
     @property
     def far(self) -> bool:
-        """Whether a fit begins far from the data."""
+        """Whether a fit starts far from the data."""
         return self.weight < FAR
 
 
@@ -140,15 +170,22 @@ def survey(
     centres: Sequence[Centre],
     form: Form,
 ) -> Survey | None:
-    """Return how a form does over its prior, the nuisances solved for in the linear model.
+    """Return the prior grid scan of a form, nuisances solved for in the linear model.
 
-    None if it changes nothing that was measured, or cannot run.
+    None if the form changes nothing that was measured, or cannot run.
 
     Parameters
     ----------
-    forms : of the model without the form. centres : where it is linearised: a misfit draws the
-        most probable scores of a wrong model away from those of the right one.
-    form : the one to add.
+    problem : Problem
+    layouts : sequence of Layout
+        Of the tests.
+    forms : tuple of Form
+        Forms of the model without the one to add.
+    centres : sequence of Centre
+        Points to linearise at: a misfit draws the most probable latents of a wrong model away from
+        those of the right one.
+    form : Form
+        The one to add.
     """
     samples = sum(r.size for r in centres[0].residuals)
     least = min(solve(centre, centre.residuals, 1.0)[1] for centre in centres)
@@ -182,14 +219,14 @@ def survey(
 
 
 def _gain(none: float, half: float, whole: float) -> float:
-    """Return by how much the parabola through misfits at none, half and all of a change falls."""
+    """Return the drop of a parabola through the loss at none, half and all of a change."""
     curvature = 2.0 * (none + whole - 2.0 * half)
     slope = whole - none - curvature
     return slope**2 / (4.0 * curvature) if slope < 0.0 < curvature else 0.0
 
 
 def _may_win(surveyed: Survey, misfit: float, promise: float) -> bool:
-    """Return whether a form may turn out better than those with the best misfit and promise."""
+    """Return whether a form may still beat those with the best loss and expected gain."""
     if surveyed.far:
         return surveyed.misfit < WORSE * misfit + CLOSE
     return MODEST * surveyed.promise + SLIGHT > promise
@@ -198,9 +235,19 @@ def _may_win(surveyed: Survey, misfit: float, promise: float) -> bool:
 def approach(
     problem: Problem, layouts: Sequence[Layout], forms: tuple[Form, ...], surveyed: Survey
 ) -> Fit | None:
-    """Return a first fit of forms and one more; None if it cannot run.
+    """Return a first fit of a model extended by one form; None if it cannot run.
 
-    From far away the data gain weight as the fit comes near.
+    From far away the likelihood is tempered, and less so as the fit comes near.
+
+    Parameters
+    ----------
+    problem : Problem
+    layouts : sequence of Layout
+        Of the tests.
+    forms : tuple of Form
+        Forms of the model without the one to add.
+    surveyed : Survey
+        Prior grid scan of the form to add.
     """
     forms = (*forms, surveyed.form)
     best: Fit | None = None
@@ -212,7 +259,7 @@ def approach(
                     exact=False, weight=stage, most=STAGE_STEPS,
                 )  # fmt: skip
                 slopes = found.slopes
-                # What tests put down to nuisances while the shared values were wrong is forgotten.
+                # Nuisances absorbed the misfit of wrong shared values: they are reset.
                 start = Scores(found.scores.shared, tuple(np.zeros_like(z) for z in start.own))
             found = fit(problem, layouts, forms, start, SCAN, slopes, exact=False, most=STAGE_STEPS)
         except FitError:
@@ -232,12 +279,21 @@ def rank_causes(
 ) -> list[Candidate]:
     """Return the causes by evidence above a base's, best first.
 
-    Those that change nothing that was measured, or cannot run, are left out.
+    Causes that change nothing that was measured, or cannot run, are left out.
 
     Parameters
     ----------
-    base : with the forms that are already there. most : forms that are refitted, the most
-        promising ones.
+    problem : Problem
+    layouts : sequence of Layout
+        Of the tests.
+    base : Fit
+        Fit of the model to extend, with its forms.
+    causes : sequence of Cause
+        Causes to add, one at a time.
+    workers : int
+        Processes, -1 for one a core.
+    most : int
+        Largest number of forms that are refitted, the most promising ones.
     """
     unknowns = len(problem.unknowns)
     shared = base.scores.shared.copy()
@@ -257,7 +313,7 @@ def rank_causes(
     first = run_jobs(partial(approach, problem, layouts, base.forms), promising, workers)
     reached = [found for found in first if found is not None]
     least = min((found.misfit for found in reached), default=0.0)
-    # Only what is not hopeless beside the best is worth its repeatability.
+    # Forms far behind the best are pruned before their repeatability is re-estimated.
     kept = [found for found in reached if found.misfit < PRUNING_RATIO * least + CLOSE]
     fits = run_jobs(partial(settle, problem, layouts), kept, workers)
     candidates = []
@@ -274,7 +330,7 @@ def rank_causes(
                 cause,
                 fitted,
                 form,
-                # Forms that were dropped on the way count: they have next to no evidence.
+                # Pruned forms count in the average: their evidence is negligible.
                 float(special.logsumexp(evidence) - np.log(len(cause.forms))),
                 {entry.name: float(v) for (entry, _), v in zip(own_fits, evidence, strict=True)},
             )
@@ -283,7 +339,18 @@ def rank_causes(
 
 
 def examine(problem: Problem, layouts: Sequence[Layout], base: Fit, extended: Fit) -> Remainder:
-    """Return what an extended fit leaves behind, against what it explained."""
+    """Return the remaining structure of an extended fit and the share of the misfit it explains.
+
+    Parameters
+    ----------
+    problem : Problem
+    layouts : sequence of Layout
+        Of the tests.
+    base : Fit
+        Fit of the model without the extension.
+    extended : Fit
+        Fit of the extended model.
+    """
     names = shared_names(problem, extended.forms)
     p_value, left, drift = remaining(
         extended,

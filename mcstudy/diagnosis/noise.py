@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 MIN_COUNT = 40
 """Samples before contact from which noise is estimated."""
 LEVEL = 1e-3
-"""Probability below which the stated noise is not believed."""
+"""p-value below which the stated noise is rejected."""
 WEAKEST = 0.15
 """Correlation of neighbours below which the noise counts as white."""
 
@@ -55,12 +55,12 @@ def estimate_noise(lead_ins: list[Array], stated: float) -> Noise:
         if stated > 0.0:
             return Noise(stated, 0.0, False)
         raise ValueError("sd is 0 and the samples before contact do not vary; state sd")
-    # Each part lost its mean: neighbours then correlate by -1/n of white noise.
+    # Removing each part's mean makes neighbours of white noise correlate by -1/n.
     bias = sum(1.0 for _ in parts) / sum(part.size for part in parts)
     correlation = float(np.clip(products / square + bias, 0.0, 0.98))
     if correlation < WEAKEST:
         correlation = 0.0
-    # Correlated samples count for fewer in the variance.
+    # Correlation reduces the effective number of samples.
     freedom = count * (1.0 - correlation**2) / (1.0 + correlation**2)
     found = float(np.sqrt(square / count))
     if stated > 0.0 and correlation == 0.0:

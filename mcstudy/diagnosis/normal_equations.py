@@ -11,7 +11,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Scores:
-    """Scores of the shared values (p,) and of each test's nuisances (q,)."""
+    """Standard-normal latents.
+
+    Attributes
+    ----------
+    shared : (p,) of the shared values.
+    own : (q,) of each test's nuisances.
+    """
 
     shared: Array
     own: tuple[Array, ...]
@@ -19,24 +25,28 @@ class Scores:
 
 @dataclass(frozen=True)
 class Step:
-    """A move of all scores, and the log units by which the linear model gains there."""
+    """A move of all latents, and the gain in log posterior that the linear model predicts."""
 
     move: Scores
     expected_gain: float
 
 
 class NormalEquations:
-    """The equations at some slopes; residuals come later, so that many share the work.
+    """The normal equations at a Jacobian; residuals come later, so that many share the work.
 
     Parameters
     ----------
-    own, shared : slopes (n, q) and (n, p), whitened, a test.
-    weight : of the data against the priors.
+    own : sequence of (n, q) array
+        Whitened Jacobian in a test's own nuisances, one a test.
+    shared : sequence of (n, p) array
+        Whitened Jacobian in the shared latents, one a test.
+    weight : float
+        Weight of the data against the priors.
 
     Attributes
     ----------
-    schur : (p, p), inverse covariance of the shared scores.
-    log_determinant : of the inverse covariance of all scores.
+    schur : (p, p), inverse covariance of the shared latents.
+    log_determinant : of the inverse covariance of all latents.
     """
 
     def __init__(self, own: Sequence[Array], shared: Sequence[Array], weight: float = 1.0) -> None:
@@ -59,11 +69,14 @@ class NormalEquations:
             self.log_determinant += float(np.linalg.slogdet(self.schur)[1])
 
     def solve(self, residuals: Sequence[Array], scores: Scores) -> Step:
-        """Return the move to the most probable scores of the linear model.
+        """Return the move to the most probable latents of the linear model.
 
         Parameters
         ----------
-        residuals : (n,) whitened, a test. scores : at which they are.
+        residuals : sequence of (n,) array
+            Whitened, one a test.
+        scores : Scores
+            Latents that the residuals belong to.
         """
         right = -scores.shared.copy()
         gain = 0.0

@@ -1,4 +1,4 @@
-"""What could have been seen: the smallest size of each cause, and the measurement to add."""
+"""Minimum detectable effect of each cause, and value of information of extra measurements."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -26,18 +26,18 @@ from mcstudy.studyfile.input_space import value_at
 Array = NDArray[np.float64]
 
 SIZES = np.array([-4.0, -2.5, -1.7, -1.0, -0.5, -0.2, 0.0, 0.2, 0.5, 1.0, 1.7, 2.5, 4.0])
-"""Scores of a cause's size at which its visibility is computed."""
+"""Latents of a cause's size at which its detectability is computed."""
 
 
 @dataclass(frozen=True)
 class Visible:
-    """The smallest size of a cause that would have been seen with 80 % power.
+    """The minimum detectable effect of a cause at 80 % power.
 
     Attributes
     ----------
-    cause, form, parameter, unit : what it is.
-    value : of the parameter there; NaN if no size within the prior would have been seen.
-    none : value at which there is no effect.
+    cause, form, parameter, unit : names of cause, form and size parameter, and its unit.
+    value : minimum detectable value; NaN if no size within the prior is detectable.
+    none : null value, at which there is no effect.
     """
 
     cause: str
@@ -55,11 +55,18 @@ def minimum_detectable_effects(
     causes: Sequence[Cause],
     threshold: float,
 ) -> list[Visible]:
-    """Return for each cause the smallest size that would have been seen.
+    """Return the minimum detectable effect of each cause.
 
     Parameters
     ----------
-    fitted : the model as it stands. threshold : standard errors from which there is an alarm.
+    problem : Problem
+    layouts : sequence of Layout
+        Of the tests.
+    fitted : Fit
+        Fit of the base model.
+    causes : sequence of Cause
+    threshold : float
+        Score, in standard errors, from which a template raises an alarm.
     """
     found = []
     for cause in causes:
@@ -89,13 +96,13 @@ def _sized_form(cause: Cause) -> Form:
 
 
 def _crossing(values: Array, strengths: Array, none: float, needed: float) -> float:
-    """Return the value nearest to none at which the strength reaches what is needed.
+    """Return the value nearest to the null value at which the strength reaches ``needed``.
 
-    An effect that fades away from none, as a filter's class does towards the one stated, is
-    followed from where it is faintest.
+    An effect that weakens away from the null value, as a filter's class does towards the stated
+    one, is followed from its weakest point.
     """
     away = np.abs(values - none)
-    # One side of none: the stronger effects of a prior about none are those above it.
+    # One side of the null value: of a prior on both sides the one above it is used.
     side = values > none if np.any(values > none) and np.any(values < none) else away > 0.0
     away, strengths, values = away[side], strengths[side], values[side]
     order = np.argsort(away)
@@ -123,7 +130,9 @@ class Extra:
     Attributes
     ----------
     title : in words.
-    signals, scalars : standard uncertainty by name. inputs : recorded better, new uncertainty.
+    signals : standard uncertainty of each added signal.
+    scalars : standard uncertainty of each added scalar.
+    inputs : new standard uncertainty of inputs that are recorded better.
     """
 
     title: str
@@ -134,14 +143,13 @@ class Extra:
 
 @dataclass(frozen=True)
 class Worth:
-    """What an extra measurement is worth.
+    """Value of information of an extra measurement.
 
     Attributes
     ----------
     title : of the measurement.
-    separation : log units by which the best cause would stand out from its nearest rival; NaN if
-        it has none.
-    visibility : factor on the visibility of the catalogue's causes, geometric mean.
+    separation : log evidence of the best cause over its nearest rival; NaN if it has none.
+    visibility : factor on the detectability of the catalogue's causes, geometric mean.
     """
 
     title: str
@@ -157,12 +165,21 @@ def value_of_information(
     causes: Sequence[Cause],
     extras: Sequence[tuple[Extra, Simulate]],
 ) -> list[Worth]:
-    """Return what extra measurements are worth, the most valuable first.
+    """Return the value of information of extra measurements, largest first.
 
     Parameters
     ----------
-    best : the fit that is believed. rivals : fits that cannot be told from it.
-    extras : measurements, each with a simulation that gives them.
+    problem : Problem
+    layouts : sequence of Layout
+        Of the tests.
+    best : Fit
+        Fit of the selected model.
+    rivals : sequence of Fit
+        Fits that the data cannot distinguish from it.
+    causes : sequence of Cause
+        Causes whose detectability is computed.
+    extras : sequence of (Extra, Simulate)
+        Measurements, each with a simulation that provides them.
     """
     nothing = Extra("as it was measured", {}, {}, {})
     seen_now = _visibility(*_with(problem, layouts, best, nothing, problem.simulate), causes)
@@ -183,7 +200,7 @@ def value_of_information(
 def _with(
     problem: Problem, layouts: Sequence[Layout], best: Fit, extra: Extra, simulate: Simulate
 ) -> tuple[Problem, list[Layout], Fit]:
-    """Return the problem as the best fit would make it, noise-free, with an extra measurement.
+    """Return the problem with noise-free data of the best fit and an extra measurement.
 
     Raises
     ------
@@ -227,7 +244,7 @@ def _noise_free(
 def _visibility(
     problem: Problem, layouts: Sequence[Layout], fitted: Fit, causes: Sequence[Cause]
 ) -> Array:
-    """Return by cause how many standard errors its median size, or a usual one, amounts to."""
+    """Return the detectability of each cause at one prior sd of its size, in standard errors."""
     taken = {form.cause for form in fitted.forms}
     strengths = []
     for cause in causes:
@@ -246,7 +263,7 @@ def _visibility(
 
 
 def _distance(problem: Problem, layouts: Sequence[Layout], best: Fit, rival: Fit) -> float:
-    """Return the misfit (log units) that a rival cause has on noise-free data of the best one."""
+    """Return a rival's excess negative log posterior on noise-free data of the best cause."""
     own = tuple(np.zeros(len(layout.names)) for layout in layouts)
     start = Scores(rival.scores.shared, own)
     if linearise(problem, layouts, rival.forms, start, best.scatter) is None:

@@ -1,7 +1,8 @@
-"""What a diagnosis works on: tests, what is not known of them, and a model to simulate them with.
+"""Input of a diagnosis: tests, their uncertain quantities, and a model to simulate them with.
 
-All that is uncertain is written in *scores*: standard normal numbers from which a prior's quantile
-makes the value. So every prior is the same, and a parameter cannot leave its range.
+All uncertain quantities are expressed as standard-normal latents (*scores* in the code); the
+quantile function of a prior maps a latent to a value. So all priors have the same form, and a
+parameter cannot leave its range.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,8 +23,11 @@ class Signal:
 
     Attributes
     ----------
-    name : as the model calls it. time, values : (n,) s and unit.
-    sd : standard deviation of the noise. correlation : of neighbouring samples of it.
+    name : as in the model.
+    time : (n,) s.
+    values : (n,) in the channel's unit.
+    sd : standard deviation of the noise.
+    correlation : of neighbouring samples of the noise.
     """
 
     name: str
@@ -39,8 +43,10 @@ class Scalar:
 
     Attributes
     ----------
-    name : as the model calls it. value, sd : with its standard uncertainty, infinite if missing.
-    scatters : whether it has a repeatability from test to test beside that.
+    name : as in the model.
+    value : as measured.
+    sd : standard uncertainty, infinite if missing.
+    scatters : whether it also has a test-to-test repeatability.
     """
 
     name: str
@@ -55,11 +61,13 @@ class Test:
 
     Attributes
     ----------
-    name : id. inputs : every input that is recorded or fixed, as recorded.
+    name : id.
+    inputs : every input that is recorded or fixed, as recorded.
     doubtful : standard uncertainty of the recorded inputs that have one.
-    signals, scalars : measured, and independent of each other.
-    derived : scalars that follow from the signals; they judge, but are no evidence.
-    covariates : what a slow change may follow, the order of the tests at least.
+    signals : measured channels, independent of each other and of the scalars.
+    scalars : measured scalars, independent of each other.
+    derived : scalars that follow from the signals; used for validation, not as evidence.
+    covariates : candidates that a slow change may follow, at least the order of the tests.
     """
 
     name: str
@@ -70,7 +78,7 @@ class Test:
     derived: tuple[Scalar, ...]
     covariates: Mapping[str, float]
 
-    # Not a test of pytest's, whatever its name says.
+    # Keeps pytest from collecting it.
     __test__ = False
 
 
@@ -88,9 +96,11 @@ class Parameter:
 
     Attributes
     ----------
-    name, unit, meaning : of it.
+    name : of the parameter.
+    unit : of its value.
+    meaning : in words.
     prior : input space of this parameter alone.
-    none : value at which it does nothing.
+    none : null value, at which the cause has no effect.
     family : of the prior: ``lognormal``, ``normal`` or ``uniform``.
     """
 
@@ -108,8 +118,10 @@ class Form:
 
     Attributes
     ----------
-    cause, name : of the cause and of the form.
-    fixed : values of parameters that the form fixes. free : parameters that are fitted.
+    cause : name of the cause.
+    name : of the form.
+    fixed : values of parameters that the form fixes.
+    free : parameters that are fitted.
     """
 
     cause: str
@@ -118,14 +130,14 @@ class Form:
     free: tuple[Parameter, ...]
 
     def values(self, scores: Sequence[float] | Array) -> dict[str, float]:
-        """Return the parameters by name at scores of the free ones."""
+        """Return the parameters by name at latents of the free ones."""
         free = {p.name: value_at(p.prior, float(z)) for p, z in zip(self.free, scores, strict=True)}
         return {**self.fixed, **free}
 
 
 @dataclass(frozen=True)
 class Cause:
-    """A named cause with its forms, the parameter that says how large it is, and what tells it."""
+    """A named cause: its forms, its size parameter, its signature and confusable causes."""
 
     name: str
     title: str
@@ -138,7 +150,7 @@ class Cause:
 
 @dataclass(frozen=True)
 class Observation:
-    """What a simulated test gives: (time, values) by signal, values by scalar."""
+    """Outputs of a simulated test: (time, values) by signal, values by scalar."""
 
     signals: Mapping[str, tuple[Array, Array]]
     scalars: Mapping[str, float]

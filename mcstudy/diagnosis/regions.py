@@ -1,4 +1,4 @@
-"""Where a misfit is: which channel, which part of the pulse, which tests."""
+"""Location of a misfit: channel, part of the pulse, group of tests."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from mcstudy.diagnosis.templates import regimes_of
 Array = NDArray[np.float64]
 
 WINDOWS = 8
-"""Parts of a pulse."""
+"""Number of parts of a pulse."""
 GROUPS = ("low", "middle", "high")
 """Thirds of the tests by the leading regime."""
 SIZE = 0.05
-"""Unit of a shape, over the peak."""
+"""Unit of a shape, relative to the peak."""
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,12 @@ class Region:
 
     Attributes
     ----------
-    channel : signal or scalar. group : of tests, by the regime; ``begin``, ``end`` : s after the
-    begin of the pulse, on average; 0 for a scalar. low, high : of the regime in the group.
-    z : measured above simulated, in standard errors. size : relative to the peak.
+    channel : signal or scalar.
+    group : of tests, by the regime.
+    begin, end : s after the begin of the pulse, averaged over tests; 0 for a scalar.
+    low, high : range of the regime in the group.
+    z : measured minus simulated, in standard errors.
+    size : measured minus simulated, relative to the peak.
     """
 
     channel: str
@@ -56,7 +59,7 @@ class Where:
 
 
 def locate_misfit(fitted: Fit, layouts: Sequence[Layout]) -> Where:
-    """Return how far measured is from simulated in each region, nuisances integrated out."""
+    """Return measured minus simulated in each region, nuisances integrated out."""
     regime, groups = _grouped(layouts)
     names: list[tuple[str, int, str]] = []
     columns: list[list[Array]] = [[] for _ in layouts]

@@ -1,9 +1,9 @@
-"""Is a model adequate: a p-value calibrated on data that the model itself makes.
+"""Model adequacy: a p-value calibrated on data simulated from the model itself.
 
 Four statistics look for four kinds of misfit: the catalogue's causes (largest score over the bank
-of templates), drifts, a smooth discrepancy and a fine one that all tests share. The smallest of
-their p-values is calibrated on the same simulated data, on each of which the size of the
-repeatability is estimated anew.
+of templates), drifts, a smooth discrepancy, and a fine one that all tests share. The smallest of
+their p-values is calibrated on the same simulated data; the repeatability is re-estimated on each
+data set.
 """
 
 import itertools
@@ -26,26 +26,26 @@ LEVEL = 0.05
 DRAWS = 1000
 """Simulated data sets on which a p-value is calibrated."""
 USUAL, SPREAD = 0.01, 1.2
-"""Median and logarithmic spread of the prior of the repeatability (assumed: 0.3 to 3 %)."""
+"""Median and log standard deviation of the repeatability's prior (assumed: 0.3 to 3 %)."""
 SMALLEST, LARGEST = 2e-4, 0.2
 """Bounds of the repeatability."""
 NEAR = np.array([0.4, 0.55, 0.75, 1.0, 1.35, 1.8, 2.5])
-"""Factors about the repeatability that are tried for simulated data."""
+"""Factors on the repeatability that are tried on simulated data."""
 FREE = 10.0
-"""Units of a discrepancy that is left free while the repeatability is estimated."""
+"""Prior standard deviation of a discrepancy that is free while the repeatability is estimated."""
 SEEN = 1e-4
-"""Share of a shape's sum of squares that the nuisances must leave for it to be seen."""
+"""Share of a shape's sum of squares that must remain beside nuisances to be detectable."""
 FAINTEST = 0.01
-"""Squared standard errors from which it can be."""
+"""Information below which it is not detectable."""
 POWER = float(stats.norm.ppf(0.8))
-"""Standard errors beyond a threshold at which it is passed with 80 % power."""
+"""Standard errors beyond a threshold at which the power is 80 %."""
 FLIPS = 4000
-"""Sign flips of whole tests."""
+"""Random sign flips of whole tests."""
 
 
 @dataclass(frozen=True)
 class Statistic:
-    """One way of looking: name, value, its own p-value."""
+    """A test statistic: name, value, its own p-value."""
 
     name: str
     value: float
@@ -54,16 +54,17 @@ class Statistic:
 
 @dataclass(frozen=True)
 class Screening:
-    """Result of a screening.
+    """Result of a model adequacy test.
 
     Attributes
     ----------
     p_value : calibrated, of the smallest of the statistics' p-values.
     statistics : by kind of misfit.
-    scores, information : of the templates, one by one. scores are in standard errors.
-    threshold : standard errors from which a template's score is an alarm.
+    scores : standardised score statistics of the templates, in standard errors.
+    information : Fisher information of the templates.
+    threshold : score, in standard errors, from which a template raises an alarm.
     flip_p_value : by flipping the signs of whole tests, which needs no covariance.
-    drift : the drift with the largest log Bayes factor, and that.
+    drift : the drift with the largest log Bayes factor, and that factor.
     """
 
     p_value: float
@@ -76,7 +77,7 @@ class Screening:
 
 
 def _errors(marginal: Marginal, information: Array) -> Array:
-    """Return the standard errors of scores (m,), infinite for shapes that nuisances swallow."""
+    """Return the standard errors of scores (m,), infinite for shapes that nuisances absorb."""
     left = np.diag(information)
     seen = left > np.maximum(SEEN * marginal.squares, FAINTEST)
     return np.where(seen, np.sqrt(np.maximum(left, FAINTEST)), np.inf)
@@ -85,7 +86,20 @@ def _errors(marginal: Marginal, information: Array) -> Array:
 def score_templates(
     fitted: Fit, layouts: Sequence[Layout], bank: Sequence[Template]
 ) -> tuple[Array, Array]:
-    """Return score and information of templates, nuisances integrated out; zero if not seen."""
+    """Return score and information of templates, nuisances integrated out; zero if undetectable.
+
+    Parameters
+    ----------
+    fitted : Fit
+    layouts : sequence of Layout
+        Of its tests.
+    bank : sequence of Template
+        m templates.
+
+    Returns
+    -------
+    score, information : (m,) arrays
+    """
     if not bank:
         return np.zeros(0), np.zeros(0)
     tables = [np.stack([t.columns[i] for t in bank], axis=1) for i in range(len(layouts))]
@@ -100,8 +114,11 @@ def estimate_scatter(fitted: Fit, layouts: Sequence[Layout], shapes: Shapes | No
 
     Parameters
     ----------
-    fitted : Fit. layouts : of its tests.
-    shapes : a discrepancy common to all tests that is left free, so that it is not taken for
+    fitted : Fit
+    layouts : sequence of Layout
+        Of its tests.
+    shapes : Shapes or None
+        Discrepancy common to all tests that is left free, so that it is not taken for
         repeatability; None for none.
     """
     tables = [np.zeros((r.size, 0)) for r in fitted.residuals] if shapes is None else shapes.columns
@@ -144,12 +161,18 @@ def screen(
     fine: Shapes,
     rng: np.random.Generator,
 ) -> Screening:
-    """Return how a fit stands against the data.
+    """Return the adequacy test of a fit against the data.
 
     Parameters
     ----------
-    fitted : Fit. layouts : of its tests.
-    bank, drift, smooth, fine : shapes of misfit, about the fit.
+    fitted : Fit
+    layouts : sequence of Layout
+        Of its tests.
+    bank : sequence of Template
+        Templates of the causes about the fit.
+    drift, smooth, fine : Shapes
+        Drifts and discrepancies about the fit.
+    rng : Generator
     """
     tables = _tables(bank, drift, smooth, fine, len(layouts))
     marginal = Marginal(fitted, layouts, tables)
@@ -182,7 +205,7 @@ def screen(
 
 
 def _best_drift(reduced: Reduced, part: slice, names: Sequence[str]) -> tuple[str, float]:
-    """Return the drift with the largest log Bayes factor, and that."""
+    """Return the drift with the largest log Bayes factor, and that factor."""
     found = [
         (float(log_bayes_factor(reduced.information[k : k + 1, k : k + 1],
                                 reduced.score[:, k : k + 1])[0]), name)
@@ -195,9 +218,17 @@ def _best_drift(reduced: Reduced, part: slice, names: Sequence[str]) -> tuple[st
 def remaining(
     fitted: Fit, layouts: Sequence[Layout], drift: Shapes, smooth: Shapes, fine: Shapes
 ) -> tuple[float, float, tuple[str, float]]:
-    """Return what a fit leaves: p-value, misfit that a discrepancy would explain, best drift.
+    """Return p-value, misfit that a discrepancy would explain (log units), and best drift.
 
-    The p-value is the smallest of three by chi-square, times three.
+    The p-value is the smallest of three chi-square p-values, times three (Bonferroni).
+
+    Parameters
+    ----------
+    fitted : Fit
+    layouts : sequence of Layout
+        Of its tests.
+    drift, smooth, fine : Shapes
+        Drifts and discrepancies about the fit.
     """
     tables = _tables((), drift, smooth, fine, len(layouts))
     marginal = Marginal(fitted, layouts, tables)
@@ -245,7 +276,7 @@ def _statistics(reduced: Reduced, parts: Sequence[slice], errors: Array) -> Arra
 def _null(
     marginal: Marginal, scatter: Scatter, parts: Sequence[slice], rng: np.random.Generator
 ) -> Array:
-    """Return the statistics (DRAWS, 4) of data that the model makes."""
+    """Return the statistics (DRAWS, 4) of data simulated from the model."""
     products = marginal.draw(DRAWS, scatter, rng)
     smooth = parts[2]
     best = np.full(DRAWS, -np.inf)
@@ -276,7 +307,7 @@ def _upper_share(null: Array, values: Array) -> Array:
 def _flip(fitted: Fit, bank: Sequence[Template], rng: np.random.Generator) -> float:
     """Return the p-value of the bank when the signs of whole tests are flipped.
 
-    It needs no covariance, but cannot be small where few tests carry a misfit.
+    It needs no covariance, but cannot be small where the misfit is in few tests.
     """
     if not bank:
         return 1.0

@@ -1,4 +1,4 @@
-"""The search: adequate or not, which cause, whether a second one, or none of the catalogue."""
+"""The diagnosis: model adequacy, the best cause, a second cause, or none of the catalogue."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -33,26 +33,26 @@ from mcstudy.errors import UserError
 from mcstudy.studyfile.input_space import value_at
 
 SECOND = 6.0
-"""Log units of evidence that a second cause must add."""
+"""Log evidence that a second cause must add."""
 SINGLES, SECONDS = 30, 12
 """Forms that are refitted, as a single cause and as a second one."""
 SECOND_SHARE = 0.02
-"""Share of the first cause's evidence that a second one must add: beside a large effect even the
-best form of it leaves a little."""
+"""Share of the first cause's log evidence that a second one must add: even the best form of a
+large effect leaves a small residual."""
 ALMOST_ALL = 0.98
-"""Share of the explained misfit from which no second cause is looked for."""
+"""Explained share of the misfit above which no second cause is sought."""
 FAINT_SHARE = 0.003
-"""The same where the first cause alone leaves nothing that a general test would see."""
+"""``SECOND_SHARE`` where the first cause alone passes the general test of its residuals."""
 NOTABLE = 0.1
-"""Share of the first cause's evidence that a second one must add where they leave structure."""
+"""The same where the residuals of both causes have structure."""
 NEARLY_ALL = 0.99
-"""Share of the misfit that two causes which leave structure must explain together."""
+"""Share of the misfit that two causes must explain where structure remains."""
 FURTHER = 4.5
-"""Standard errors from which a cause's template, after the first cause, is a second one's trace."""
+"""Template score, in standard errors, that indicates a second cause after the first one."""
 MAX_SECONDS = 2
-"""Second causes that may be alike: what more of them explain equally well is nobody's trace."""
+"""Largest number of indistinguishable second causes; with more of them none is named."""
 RIVAL = 0.5
-"""Share of the best cause's evidence from which another one is tried as the first of two."""
+"""Share of the best log evidence above which another cause is tried as the first of two."""
 PAIRS = 2
 """Causes, best first, with which a second one is tried."""
 
@@ -62,24 +62,28 @@ Tell = Callable[[str], None]
 
 
 def _silent(_text: str) -> None:
-    """Tell nothing."""
+    """Ignore a progress message."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What a search found.
+    """Result of a diagnosis.
 
     Attributes
     ----------
-    layouts : of the tests. base : fit of the model as it stands.
-    bank, screening : templates of the causes, and whether the base is adequate.
+    layouts : of the tests.
+    base : fit of the base model.
+    bank : templates of the causes.
+    screening : adequacy test of the base model.
     candidates : causes by evidence, best first; empty if the base is adequate.
-    remainder : what the best candidate leaves.
-    cause : name, ``unexplained``, or None if adequate. ambiguous : names within reach of the best.
-    second : the second cause with its remainder, or None.
+    remainder : remaining structure of the best candidate.
+    cause : name, ``unexplained``, or None if adequate.
+    ambiguous : causes indistinguishable from the best one.
+    second : the second cause, or None.
+    second_ambiguous : causes indistinguishable from the second one.
     best : the fit to extend the model with, or None.
-    flagged : whether the causes that are named leave structure behind.
-    why : why the answer is what it is.
+    flagged : whether structure remains beside the named causes.
+    why : reason for the result, in words.
     """
 
     layouts: tuple[Layout, ...]
@@ -103,7 +107,7 @@ class Finding:
 
 
 def fit_base(problem: Problem) -> tuple[tuple[Layout, ...], Fit]:
-    """Return the layouts of the tests and the fit of the model as it stands.
+    """Return the layouts of the tests and the fit of the base model.
 
     Raises
     ------
@@ -133,17 +137,29 @@ def search(
     workers: int = 1,
     tell: Tell = _silent,
 ) -> Finding:
-    """Return what the simulation gets wrong, if anything, and why.
+    """Return the diagnosis of a model against its tests.
 
     Parameters
     ----------
-    problem : Problem. causes : of the catalogue. seed : of the simulated data sets.
-    workers : processes, -1 for one a core. tell : takes what is being done, in words.
+    problem : Problem
+    causes : sequence of Cause
+        Of the catalogue.
+    seed : int
+        Of the simulated data sets.
+    workers : int
+        Processes, -1 for one a core.
+    tell : callable
+        Receives progress messages.
+
+    Raises
+    ------
+    UserError
+        If the model cannot simulate one of the tests.
     """
     rng = np.random.default_rng(seed)
-    tell("fitting the model as it stands")
+    tell("fitting the base model")
     layouts, base = fit_base(problem)
-    tell("is it adequate?")
+    tell("testing its adequacy")
     bank = tuple(cause_templates(problem, layouts, base, all_forms(causes)))
     screening = screen(
         base,
@@ -156,11 +172,11 @@ def search(
     )
     empty = Finding(
         layouts, base, bank, screening, (), None, None, (), None, (), None, False,
-        "the model explains the data within what is uncertain",
+        "the model explains the data within its uncertainty",
     )  # fmt: skip
     if screening.p_value > LEVEL:
         return empty
-    tell("it is not: trying the causes")
+    tell("the model is inadequate: fitting the causes")
     settled = settle(problem, layouts, base)
     candidates = rank_causes(problem, layouts, settled, causes, workers, SINGLES)
     return _judge(problem, causes, replace(empty, base=settled), tuple(candidates), workers, tell)
@@ -174,7 +190,7 @@ def _judge(
     workers: int,
     tell: Tell,
 ) -> Finding:
-    """Return the finding for ranked candidates."""
+    """Return the result for ranked candidates."""
     nothing = replace(empty, candidates=candidates, cause=UNEXPLAINED)
     if not candidates or candidates[0].log_evidence < DISTINCT:
         return replace(nothing, why="no cause of the catalogue explains the misfit")
@@ -182,7 +198,7 @@ def _judge(
     left = examine(problem, empty.layouts, empty.base, best.fitted)
     drift, evidence = empty.screening.drift
     if evidence > best.log_evidence + DISTINCT and left.p_value < STRUCTURE:
-        return replace(nothing, remainder=left, why=f"{drift} explains more: a slow change")
+        return replace(nothing, remainder=left, why=f"a slow change explains more: {drift}")
     alone = replace(
         nothing,
         remainder=left,
@@ -193,7 +209,7 @@ def _judge(
     )
     clean = left.p_value >= STRUCTURE
     flagged = replace(
-        alone, flagged=True, why="one cause explains most of the misfit; something remains"
+        alone, flagged=True, why="one cause explains most of the misfit; structure remains"
     )
     if clean and not _trace(problem, causes, empty.layouts, best.fitted):
         return alone
@@ -216,19 +232,19 @@ def _judge(
             flagged=not explained,
             why="two causes explain the misfit together"
             if explained
-            else "two causes explain most of the misfit; something remains",
+            else "two causes explain most of the misfit; structure remains",
         )
     if clean:
         return alone
     if left.share >= MAX_SHARE:
         return flagged
-    return replace(nothing, remainder=left, why="the best cause leaves structure behind")
+    return replace(nothing, remainder=left, why="structure remains beside the best cause")
 
 
 def _trace(
     problem: Problem, causes: Sequence[Cause], layouts: Sequence[Layout], fitted: Fit
 ) -> bool:
-    """Return whether a further cause leaves a trace that is too faint for a general test."""
+    """Return whether a template detects a further cause that the general test misses."""
     bank = cause_templates(problem, layouts, fitted, all_forms(causes))
     score, information = score_templates(fitted, layouts, bank)
     seen = information > 0.0
@@ -236,7 +252,7 @@ def _trace(
 
 
 def _near(candidates: Sequence[Candidate]) -> tuple[str, ...]:
-    """Return the causes that cannot be told from the best one, nothing if it stands alone."""
+    """Return the causes indistinguishable from the best one, with it; none if it is unique."""
     limit = candidates[0].log_evidence - DISTINCT
     near = tuple(c.cause.name for c in candidates if c.log_evidence > limit)
     return near if len(near) > 1 else ()
@@ -251,7 +267,7 @@ class _Pair:
 
     @property
     def log_evidence(self) -> float:
-        """Evidence of both together, second causes' forms averaged."""
+        """Log evidence of both together, averaged over the second cause's forms."""
         return self.first.fitted.log_evidence + self.seconds[0].log_evidence
 
     @property
@@ -268,13 +284,14 @@ def _best_pair(
     share: float,
     workers: int,
 ) -> tuple[_Pair, Remainder, tuple[str, ...]] | None:
-    """Return the pair of causes that explains the misfit, if one does and no single one can.
+    """Return the pair of causes that explains the misfit, None if no second cause is warranted.
 
-    With what it leaves, and the first causes that do as well with the same second one, if any.
+    With its remaining structure, and first causes that do equally well with the same second one.
 
     Parameters
     ----------
-    share : of the first cause's evidence that the second one must add.
+    share : float
+        Share of the first cause's log evidence that the second one must add.
     """
     pairs: list[_Pair] = []
     for first in candidates[:PAIRS]:

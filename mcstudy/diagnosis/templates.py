@@ -1,4 +1,4 @@
-"""Shapes that a misfit may have: those of the causes, drifts, and shapes that name nothing."""
+"""Shapes of a misfit: those of the causes, drifts, and discrepancies without a named cause."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,29 +16,33 @@ Array = NDArray[np.float64]
 SMOOTH = 7
 """Cosines over the pulse of a smooth discrepancy."""
 HIGHEST = 1500.0
-"""Hz up to which a discrepancy that all tests share is looked for (below CFC 1000's corner)."""
+"""Hz, highest frequency of a discrepancy that all tests share (below CFC 1000's corner)."""
 MAX_FINE = 48
 """Cosines beyond the smooth ones, at most."""
 SIZE = 0.05
-"""A discrepancy's unit, over the peak of the signal or the scalar."""
+"""Unit of a discrepancy, relative to the peak of the signal or to the scalar."""
 DRIFT = 2.0
-"""A drift's unit in scores per standard deviation of what it follows."""
+"""Unit of a drift in latents per standard deviation of its covariate."""
 PULSE_DRIFT = 0.02
 """The same for the pulse, relative."""
 ONE_PARAMETER = (-2.0, -1.0, -0.3, 0.3, 1.0, 2.0)
 MORE_PARAMETERS = (-2.0, -1.0, 0.0, 1.0, 2.0)
 FINE = tuple(np.linspace(-2.5, 2.5, 17))
 BESIDE_FINE = (-1.5, 0.0, 1.5)
-"""Scores of a cause's parameters at which it is tried."""
+"""Latents of a cause's parameters at which it is tried."""
 STANDARD_GRID = 3
-"""Free parameters beyond which the further ones stay at their median."""
+"""Number of free parameters on the grid; further ones stay at their median."""
 
 
 @dataclass(frozen=True)
 class Template:
-    """A cause at one size: its form, the scores of its parameters, and its change of each test.
+    """A cause at one size.
 
-    ``columns`` are whitened, (n,) a test.
+    Attributes
+    ----------
+    form : of the cause.
+    scores : latents of its parameters.
+    columns : (n,) whitened change of the data, one a test.
     """
 
     form: Form
@@ -48,14 +52,14 @@ class Template:
 
 @dataclass(frozen=True)
 class Shapes:
-    """Named columns: (n, k) whitened, a test."""
+    """Named columns (n, k), whitened, one table a test."""
 
     names: tuple[str, ...]
     columns: tuple[Array, ...]
 
 
 def score_grid(form: Form, *, fine: bool = False) -> list[Array]:
-    """Return the scores at which a form is tried; ``fine`` steps closely along the first one."""
+    """Return the latents at which a form is tried; ``fine`` refines the first one's grid."""
     count = len(form.free)
     if count == 0:
         return [np.zeros(0)]
@@ -71,7 +75,18 @@ def score_grid(form: Form, *, fine: bool = False) -> list[Array]:
 def cause_templates(
     problem: Problem, layouts: Sequence[Layout], fitted: Fit, forms: Sequence[Form]
 ) -> list[Template]:
-    """Return the templates of forms, about a fit; those whose runs fail are left out."""
+    """Return the templates of forms about a fit; those whose runs fail are left out.
+
+    Parameters
+    ----------
+    problem : Problem
+    layouts : sequence of Layout
+        Of the tests.
+    fitted : Fit
+        Fit to expand about.
+    forms : sequence of Form
+        Forms to add, one at a time.
+    """
     taken = {form.cause for form in fitted.forms}
     found = []
     for form in forms:
@@ -87,7 +102,24 @@ def cause_templates(
 def change_of(
     problem: Problem, layouts: Sequence[Layout], fitted: Fit, form: Form, scores: Array
 ) -> tuple[Array, ...] | None:
-    """Return what one more form changes of each test about a fit, whitened; None if a run fails."""
+    """Return the whitened change of each test by one more form about a fit; None if a run fails.
+
+    Parameters
+    ----------
+    problem : Problem
+    layouts : sequence of Layout
+        Of the tests.
+    fitted : Fit
+        Fit to expand about.
+    form : Form
+        The one to add.
+    scores : (k,) array
+        Latents of its free parameters.
+
+    Returns
+    -------
+    tuple of (n,) array or None
+    """
     moved = Scores(np.concatenate([fitted.scores.shared, scores]), fitted.scores.own)
     found = observe_tests(problem, (*fitted.forms, form), layouts, moved)
     if found is None:
@@ -101,7 +133,7 @@ def change_of(
 
 
 def covariates_of(layouts: Sequence[Layout]) -> dict[str, Array]:
-    """Return what a slow change may follow, centred and scaled to a standard deviation of one."""
+    """Return the covariates of slow changes, centred and scaled to unit standard deviation."""
     found = {}
     for name in layouts[0].test.covariates:
         values = np.array([layout.test.covariates[name] for layout in layouts])
@@ -121,7 +153,17 @@ def regimes_of(layouts: Sequence[Layout]) -> dict[str, Array]:
 
 
 def drifts(layouts: Sequence[Layout], fitted: Fit, shared: Sequence[str]) -> Shapes:
-    """Return every nuisance and every shared value drifting along every covariate."""
+    """Return every nuisance and every shared value drifting along every covariate.
+
+    Parameters
+    ----------
+    layouts : sequence of Layout
+        Of the tests.
+    fitted : Fit
+        Fit whose Jacobian is used.
+    shared : sequence of str
+        Names of the shared values.
+    """
     names: list[str] = []
     columns: list[list[Array]] = [[] for _ in layouts]
     for covariate, factor in covariates_of(layouts).items():
@@ -142,7 +184,7 @@ def drifts(layouts: Sequence[Layout], fitted: Fit, shared: Sequence[str]) -> Sha
 
 
 def smooth_discrepancy(layouts: Sequence[Layout], fitted: Fit) -> Shapes:
-    """Return the pulse times cosines, times one, the regimes and the covariates."""
+    """Return products of pulse and cosines: alone, times regimes, times covariates."""
     factors: Mapping[str, Array] = {
         "all tests": np.ones(len(layouts)),
         **regimes_of(layouts),

@@ -1,1 +1,1 @@
-"""How runs are done, watched and kept."""
+"""Execution of runs: workers, progress, results folders."""

@@ -1,9 +1,9 @@
-"""What a worker process runs of this package; it imports NumPy alone.
+"""Code that runs in worker processes; it imports NumPy alone.
 
-A chunk of rows is evaluated as a whole; only if that fails, row by row. A *watchdog* keeps which
-row is under way in a small file that outlives the process, and ends a process in which a row takes
-too long. Whoever finds the process dead reads from the file which row it was and whether it was too
-slow.
+A chunk of rows is evaluated as a whole; only if that fails, row by row. A *watchdog* records the
+row under way in a small file that outlives the process, and terminates a process in which a row
+takes too long. The driver reads from the file of a dead process which row it was and whether it
+timed out.
 """
 
 import contextlib
@@ -29,16 +29,16 @@ Evaluate = Callable[[Any, Array, Started], tuple[Array, list[str]]]
 OK = "ok"
 ERROR, NOT_FINITE, UNPHYSICAL = "error", "not_finite", "unphysical"
 TIMEOUT, CRASHED = "timeout", "crashed"
-"""Statuses that no model gives: they are the runner's own."""
+"""Statuses set by the runner, never by a model."""
 
 UNKNOWN = -1
-"""Number of the row under way where the evaluation does not tell."""
+"""Number of the row under way where the evaluation does not report it."""
 _SPARE = 0.25
-"""Share of the time limit after which the alarm is set anew; a row may take so much longer."""
+"""Share of the time limit after which the alarm is reset, and by which a row may exceed it."""
 
 
 class Watchdog(TypedDict):
-    """Where the row under way is kept (empty: in a folder of its own), and s that it may take."""
+    """Folder of the record of the row under way (empty: a temporary one), and time limit (s)."""
 
     folder: str
     limit: float
@@ -46,7 +46,7 @@ class Watchdog(TypedDict):
 
 @dataclass(frozen=True)
 class ChunkResult:
-    """What comes back of a chunk.
+    """Results of a chunk.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class ChunkResult:
     outputs : (k, m), NaN where a run failed.
     status : k statuses, the model's or the runner's.
     reason : k reasons for the runner's statuses, else empty.
-    seconds : wall time that the chunk took.
+    seconds : wall time of the chunk, s.
     """
 
     ids: Ids
@@ -66,13 +66,13 @@ class ChunkResult:
 
 @dataclass(frozen=True)
 class Trace:
-    """What a dead process left of its chunk.
+    """Record of a chunk whose process died.
 
     Attributes
     ----------
-    run : run id of the row that was under way, ``UNKNOWN`` if the evaluation did not tell.
+    run : run id of the row under way, ``UNKNOWN`` if the evaluation did not report it.
     ids : (k,) run ids of the chunk.
-    timed_out : whether it took too long.
+    timed_out : whether it exceeded the time limit.
     """
 
     run: int
@@ -135,7 +135,7 @@ def _evaluate_whole(
     except (KeyboardInterrupt, SystemExit, MemoryError):
         raise
     except Exception:
-        # Whatever a model raises is the fault of a row, which is found row by row.
+        # Any exception is due to a row, which is found row by row.
         return None
     return np.array(outputs, dtype=np.float64), list(status), [""] * len(rows)
 
@@ -163,7 +163,7 @@ def _evaluate_singly(
 def _check_values(
     outputs: Array, status: list[str], reason: list[str], bounds: Array, names: tuple[str, ...]
 ) -> None:
-    """Give rows whose values are no result a status and a reason, and no values."""
+    """Set status and reason of rows with invalid values, and remove the values."""
     finite = np.isfinite(outputs)
     infinite = np.isinf(outputs)
     beyond = (outputs < bounds[:, 0]) | (outputs > bounds[:, 1])
@@ -188,7 +188,7 @@ def _check_values(
 
 @contextlib.contextmanager
 def _watched(watchdog: Watchdog | None, ids: Ids) -> Iterator[Started]:
-    """Give a function that keeps which row begins, and keep the alarm set meanwhile."""
+    """Yield a function that records which row begins, with the alarm set meanwhile."""
     if watchdog is None:
         yield lambda _row: None
         return
@@ -222,7 +222,7 @@ def _watched(watchdog: Watchdog | None, ids: Ids) -> Iterator[Started]:
 
 
 def read_traces(folder: Path) -> list[Trace]:
-    """Return what dead processes left in a folder, and clear it."""
+    """Return the traces of dead processes in a folder, and clear it."""
     traces = []
     for place in sorted(folder.glob("[0-9]*")):
         slow = place.with_suffix(".slow")

@@ -1,8 +1,8 @@
 """Runs on a dask.distributed cluster.
 
 joblib's own dask backend (1.6) waits for ever when a worker is lost: it notes the error on the
-future and never calls back. The backend here calls back with the loss, and the runner sees to it.
-It leans on private names of joblib, which it checks. To import this module imports dask.
+future and never calls back. The backend here calls back with the loss, and the runner handles it.
+It relies on private names of joblib, which it checks. Importing this module imports dask.
 """
 
 import asyncio
@@ -28,23 +28,23 @@ _PRIVATE = ("_collect", "_results", "_callbacks", "waiting_futures", "retrieve_r
 
 
 class _Lost:
-    """What is called back of a future that has no result."""
+    """Callback value of a future without a result."""
 
     def __init__(self, reason: str) -> None:
         self.reason = reason
 
 
 class ClusterBackend(_dask.DaskDistributedBackend):  # type: ignore[misc]
-    """joblib's dask backend, which gives lost chunks back as such."""
+    """joblib's dask backend, extended to return lost chunks."""
 
     is_remote = True
 
     def effective_n_jobs(self, n_jobs: int) -> int:
-        """Return the cores of the cluster, two at least: with one joblib would run it all here."""
+        """Return the cores of the cluster, at least two: with one joblib would run locally."""
         return max(2, int(sum(self.client.ncores().values())))
 
     def start_call(self) -> None:
-        """Begin to collect, and to watch whether there are workers."""
+        """Start to collect results and to monitor the workers."""
         super().start_call()
         self.client.loop.add_callback(self._watch)
 
@@ -74,7 +74,7 @@ class ClusterBackend(_dask.DaskDistributedBackend):  # type: ignore[misc]
             self._callbacks.pop(future)(result)
 
     def retrieve_result_callback(self, out: Any) -> Any:
-        """Return the results of a task; of a lost one that it is lost."""
+        """Return the results of a task, or the record of its loss."""
         if isinstance(out, _Lost):
             return [LostChunk(out.reason)]
         return super().retrieve_result_callback(out)
@@ -127,13 +127,12 @@ def _client(address: str) -> Iterator[Any]:
             raise UserError(
                 f"--cluster {address}: no scheduler with workers answers ({detail})"
             ) from None
-        # A chunk that takes a worker with it must not take three more: trying again is the
-        # runner's.
+        # A chunk that kills its worker must not kill three more: the runner does the retries.
         client.run_on_scheduler(_no_retries)
         try:
             yield client
         finally:
-            # What a cluster has to say of its own end is of no use to anybody.
+            # Log messages of the shutdown are suppressed.
             logging.getLogger("distributed").setLevel(logging.CRITICAL)
             logging.getLogger("asyncio").setLevel(logging.CRITICAL)
 
@@ -143,5 +142,5 @@ def _no_retries(dask_scheduler: Any) -> None:
 
 
 def _names_of(backend: Any) -> set[str]:
-    """Return the names of a class and of what its constructor sets."""
+    """Return the names of a class and of the attributes that its constructor sets."""
     return {*dir(backend), *backend.__init__.__code__.co_names}

@@ -1,12 +1,12 @@
-"""Evaluations of a model: rows of inputs in, outputs and statuses back, in parallel.
+"""Parallel evaluation of a model: rows of inputs in, outputs and statuses out.
 
-The one door through which rows are run. The number of workers and the backend come from
+All rows are run through this module. The number of workers and the backend come from
 ``joblib.parallel_config``; a task is one chunk of plain rows for a top-level function, so nothing
-of the driver travels with it.
+of the driver is sent with it.
 
-When a worker process dies, what arrived is kept, the rows that were under way in dead processes are
-run alone, each in a process of its own, and all the rest goes on in fresh workers. A row that kills
-its own process again is recorded as crashed, one that took too long as a timeout.
+When a worker process dies, the results received so far are kept, the rows under way in dead
+processes are run alone, each in its own process, and the rest continues in fresh workers. A row
+that kills its own process again is recorded as crashed, one that took too long as a timeout.
 """
 
 import multiprocessing
@@ -41,18 +41,16 @@ Ids = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 CHUNK_TIME = 2.5
-"""Wanted duration of a chunk in s: overhead below 0.1 %, loss after a kill below a few seconds."""
+"""Target duration of a chunk in s: overhead below 0.1 %, loss after a kill a few seconds."""
 MAX_GROWTH = 8
-"""Times that a chunk may be larger than the largest so far: a first run compiles, a slow one
-misleads."""
+"""Largest growth factor of a chunk: a first run compiles, and a slow one biases the estimate."""
 MAX_SILENCE = 900.0
-"""s, beside what a run may take, without any chunk coming back after which the workers count as
-lost."""
+"""s without any result, beyond the time limit of a run, after which the workers count as lost."""
 MAX_SOLO_CRASHES = 2
-"""Times that a row must kill a process in which it is alone before it is recorded as crashed: once
-may be somebody else's kill."""
+"""Deaths of a process with this row alone before the row is recorded as crashed: a single death may
+have another cause."""
 MAX_FAILED_RESTARTS = 10
-"""Fresh workers that may die in a row without a single run arriving."""
+"""Largest number of consecutive restarts of the workers without a result."""
 _NOTHING_ARRIVES = (
     f"{MAX_FAILED_RESTARTS} times in a row the worker processes died before a run came back; what "
     "arrived is kept, run again to resume"
@@ -77,7 +75,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class LostChunk:
-    """What a cluster gives back in place of a chunk whose worker was lost, and why."""
+    """Placeholder that a cluster returns for a chunk whose worker was lost, with the reason."""
 
     reason: str
     NO_WORKERS: ClassVar[str] = "no workers"
@@ -85,16 +83,16 @@ class LostChunk:
 
 @dataclass(frozen=True)
 class Evaluator:
-    """A model that rows are run through.
+    """A model and the settings of its parallel evaluation.
 
     Attributes
     ----------
     function : top-level function of (argument, rows, started); see ``mcstudy.execution.chunk``.
     argument : plain data for it, e.g. the model's name and options.
     output_names : of the m outputs.
-    bounds : (m, 2) lowest and highest value that an output can have; none by default.
-    run_time : s that one run may take.
-    chunk_time : s that a chunk should take.
+    bounds : (m, 2) physical bounds of the outputs; none by default.
+    run_time : s, time limit of one run.
+    chunk_time : s, target duration of a chunk.
     """
 
     function: Evaluate
@@ -115,7 +113,7 @@ class Evaluator:
         Raises
         ------
         StudyError
-            If no worker can be had, or none comes back.
+            If no worker is available, or none returns.
         """
         n, m = len(rows), len(self.output_names)
         outputs = np.full((n, m), np.nan)
@@ -135,14 +133,14 @@ class Evaluator:
         rows : (n, d) array
             Inputs of all rows.
         missing : (k,) array
-            Numbers of those that are to be run.
+            Numbers of the rows to run.
         traces : Path
-            Empty folder in which workers keep what they are at.
+            Empty folder in which workers record the row under way.
 
         Raises
         ------
         StudyError
-            If no worker can be had, or none comes back.
+            If no worker is available, or none returns.
         """
         watchdog: Watchdog = {"folder": str(traces), "limit": self.run_time}
         pace, restarts = _Pace(missing.size, max(1, effective_n_jobs(None)), self.chunk_time), 0
@@ -172,7 +170,7 @@ class Evaluator:
                 yield result
             missing = _without(missing, arrived)
             if not broken:
-                # A cluster gives back what it can. What it loses twice is run here, alone.
+                # A row that a cluster loses twice is run here, alone.
                 lost[missing] += 1
                 for run in missing[lost[missing] >= MAX_SOLO_CRASHES].tolist():
                     result = self._run_alone(rows, run, watchdog, traces)
@@ -186,10 +184,9 @@ class Evaluator:
     def _run_parallel(
         self, rows: Array, missing: Ids, singly: Flags, pace: "_Pace", watchdog: Watchdog
     ) -> Iterator[ChunkResult]:
-        """Yield what one set of workers gives back of the missing rows, in whatever order."""
+        """Yield the results of one set of workers for the missing rows, in any order."""
         workers = effective_n_jobs(None)
-        # With one worker joblib runs in this process, as it should: nothing to send, nothing to
-        # end.
+        # With one worker joblib runs in this process: nothing to send, nothing to terminate.
         parallel = Parallel(
             return_as="generator_unordered",
             batch_size=1,
@@ -198,7 +195,7 @@ class Evaluator:
         )
         remote = getattr(get_active_backend()[0], "is_remote", False)
         if remote:
-            # Another machine has no such folder; a slow run is ended there all the same.
+            # Another machine has no such folder; its slow runs are terminated nevertheless.
             watchdog = {"folder": "", "limit": self.run_time}
         evaluate = self._chunk_function(watchdog if workers > 1 else None)
         results = parallel(
@@ -221,7 +218,7 @@ class Evaluator:
                 f"no chunk came back within {MAX_SILENCE + self.run_time:g} s; run again to resume"
             ) from None
         except BrokenProcessPool:
-            # The pool is gone for good; the next round gets a fresh one.
+            # A broken pool cannot be reused; the next round gets a fresh one.
             get_reusable_executor().shutdown(wait=True, kill_workers=True)
             raise
         except MemoryError:
@@ -231,7 +228,7 @@ class Evaluator:
             ) from None
         except KeyboardInterrupt:
             if workers > 1 and not remote:
-                # Nobody waits for the chunks that are under way.
+                # The chunks under way are not awaited.
                 get_reusable_executor().shutdown(wait=False, kill_workers=True)
             raise
 
@@ -243,7 +240,7 @@ class Evaluator:
         return partial(evaluate_chunk, self.function, self.argument, bounds, names, watchdog)
 
     def _run_alone(self, rows: Array, run: int, watchdog: Watchdog, traces: Path) -> ChunkResult:
-        """Return the result of one row in a process of its own, or that it crashes.
+        """Return the result of one row in its own process, or the record of its crash.
 
         Raises
         ------
@@ -262,14 +259,14 @@ class Evaluator:
                     left = read_traces(traces)
             if any(trace.timed_out for trace in left):
                 return self._failed(run, TIMEOUT)
-            # A process that dies before it comes to the row says nothing of the row.
+            # A process that dies before the row starts is no evidence against the row.
             deaths, early = (deaths + 1, early) if left else (deaths, early + 1)
             if early >= MAX_FAILED_RESTARTS:
                 raise StudyError(_NOTHING_ARRIVES)
         return self._failed(run, CRASHED)
 
     def _failed(self, run: int, status: str) -> ChunkResult:
-        """Return the record of a row that gave no result."""
+        """Return the record of a row without a result."""
         reason = {
             TIMEOUT: f"took longer than {self.run_time:g} s",
             CRASHED: f"its process died {MAX_SOLO_CRASHES} times",
@@ -280,7 +277,7 @@ class Evaluator:
 
 @dataclass
 class _Pace:
-    """How many rows a chunk should have, learnt from those that came back."""
+    """Chunk size, adapted to the cost of completed rows."""
 
     missing: int
     workers: int
@@ -289,16 +286,16 @@ class _Pace:
     cost: float = np.inf
 
     def learn(self, result: ChunkResult) -> None:
-        """Take the fastest row so far as the cost of one: others waited or compiled."""
+        """Update the cost of a row, that of the fastest chunk: others waited or compiled."""
         rows = len(result.ids)
         self.cost = min(self.cost, max(result.seconds / rows, 1e-7))
-        # A few chunks for every worker, so that none waits long for the last one.
+        # Several chunks a worker, so that none waits long for the last one.
         fair = max(1, self.missing // (8 * self.workers))
         self.size = int(np.clip(self.chunk_time / self.cost, 1, min(fair, MAX_GROWTH * self.size)))
 
 
 def _chunks(missing: Ids, pace: _Pace) -> Iterator[Ids]:
-    """Give chunks as the workers ask for them, as large as the pace says by then."""
+    """Yield chunks on demand, at the current chunk size."""
     first = 0
     while first < missing.size:
         chunk = missing[first : first + pace.size]

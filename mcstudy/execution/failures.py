@@ -1,4 +1,4 @@
-"""Failed runs: how many, and where in the space of inputs."""
+"""Failed runs: their number and their location in the input space."""
 
 from collections.abc import Collection
 from typing import Any
@@ -14,28 +14,31 @@ Flags = NDArray[np.bool_]
 _ENDINGS = {TIMEOUT: "timeout", CRASHED: "crashed", NOT_FINITE: "invalid", UNPHYSICAL: "invalid"}
 
 PARTS = 10
-"""Parts of equal counts into which an input's range is cut."""
+"""Number of parts of equal counts into which an input's range is cut."""
 SURE = 2.5
 """Standard deviations beyond which failures count as uneven (assumed): one input in forty is so by
 chance."""
 
 
 def locate_failures(inputs: pd.DataFrame, failed: Flags, block: int = 1) -> dict[str, Any]:
-    """Return how many runs failed and where.
+    """Return number and location of the failed runs.
 
     Parameters
     ----------
-    inputs : (n, d) sampled inputs. failed : (n,).
-    block : rows that belong together, such as a base point's; they count as one when the scatter of
-        failures is judged.
+    inputs : (n, d) DataFrame
+        Sampled inputs.
+    failed : (n,) array of bool
+    block : int
+        Rows that belong together, such as a base point's; they count as one in the test of
+        uniformity.
 
     Returns
     -------
     dict
         ``runs``, ``share``, ``blocks`` (blocks with a failed run), ``map`` (share of failed runs in
-        each tenth of each input) and ``where``: for inputs along which failures are not spread
-        evenly, their mean rank, 0 lowest to 1 highest, and whether they lie ``low``, ``high``, at
-        both ``ends`` or in the ``middle``.
+        each tenth of each input) and ``where``: for inputs along which failures are unevenly
+        distributed, their mean rank, 0 lowest to 1 highest, and whether they lie ``low``, ``high``,
+        at both ``ends`` or in the ``middle``.
     """
     n = len(inputs)
     count = int(failed.sum())
@@ -51,7 +54,7 @@ def locate_failures(inputs: pd.DataFrame, failed: Flags, block: int = 1) -> dict
     if not count:
         return entry
     ranks = (inputs.rank().to_numpy() - 0.5) / n
-    # Rows of a block share inputs: one mean rank a block, which scatters no more than a uniform.
+    # Rows of a block share inputs: one mean rank a block, of no more than a uniform's variance.
     lost_ranks = pd.DataFrame(ranks[failed])
     means = lost_ranks.groupby(blocks[failed]).mean().mean().to_numpy()
     from_middle = (lost_ranks - 0.5).abs().groupby(blocks[failed]).mean().mean().to_numpy()
@@ -75,17 +78,20 @@ def locate_failures(inputs: pd.DataFrame, failed: Flags, block: int = 1) -> dict
 
 
 def endings(runs: pd.DataFrame, complete: Collection[str]) -> list[dict[str, Any]]:
-    """Return how runs ended, the most frequent first.
+    """Return the outcomes of the runs, the most frequent first.
 
     Parameters
     ----------
-    runs : table with ``status`` and ``reason``. complete : statuses that are no failure.
+    runs : DataFrame
+        With ``status`` and ``reason``.
+    complete : collection of str
+        Statuses that are no failure.
 
     Returns
     -------
     list of dict
         ``status``, ``ending`` (ok, failed, invalid, timeout or crashed), ``runs`` and the most
-        frequent ``reason``, empty where the status says it all.
+        frequent ``reason``, empty where none was recorded.
     """
     found = []
     told = runs["reason"] if "reason" in runs.columns else pd.Series("", index=runs.index)

@@ -1,4 +1,4 @@
-"""A live line for long work: done, failed, rate, time left. Silent where nobody looks."""
+"""A progress line on terminals: done, failed, rate, time left."""
 
 import math
 import sys
@@ -16,11 +16,20 @@ Item = TypeVar("Item")
 REACH = 1.96
 """Standard errors of a 95 % interval."""
 MIN_COUNT = 10
-"""Values below which nothing is said of a mean."""
+"""Smallest number of values for an interval of the mean."""
 
 
 def say(text: str, *, quiet: bool = False, stream: TextIO = sys.stderr) -> None:
-    """Print a line on a terminal; nothing where nobody looks."""
+    """Print a line on a terminal only.
+
+    Parameters
+    ----------
+    text : str
+    quiet : bool
+        Print nothing at all.
+    stream : TextIO
+        By default standard error.
+    """
     if not quiet and stream.isatty():
         stream.write(f"{text}\n")
         stream.flush()
@@ -29,12 +38,17 @@ def say(text: str, *, quiet: bool = False, stream: TextIO = sys.stderr) -> None:
 def follow(
     items: Sequence[Item], what: str, *, quiet: bool = False, stream: TextIO | None = None
 ) -> Iterator[Item]:
-    """Yield the items and show on a terminal how many are done.
+    """Yield the items and show the number of completed ones on a terminal.
 
     Parameters
     ----------
-    items : sequence. what : word for the line, e.g. ``tests``.
-    quiet : print nothing at all. stream : where to, by default standard error.
+    items : sequence
+    what : str
+        Word for the line, e.g. ``tests``.
+    quiet : bool
+        Print nothing at all.
+    stream : TextIO, optional
+        By default standard error.
     """
     stream = stream or sys.stderr
     live = not quiet and stream.isatty()
@@ -56,13 +70,13 @@ class _RunningMean:
         self.count, self.mean, self.square = 0, 0.0, 0.0
 
     def add(self, values: NDArray[np.float64]) -> None:
-        """Take the finite ones of more values."""
+        """Add the finite values."""
         part = values[np.isfinite(values)]
         if not part.size:
             return
         total = self.count + part.size
         with np.errstate(over="ignore", invalid="ignore"):
-            # Numbers that are too large for their squares leave the width unknown.
+            # Overflowing squares leave the width undefined.
             shift = float(part.mean()) - self.mean
             self.square += float(((part - part.mean()) ** 2).sum())
             self.square += shift * shift * self.count * part.size / total
@@ -87,8 +101,10 @@ class Progress:
         Print nothing at all. Without a terminal nothing is printed either way.
     complete : frozenset of str
         Statuses that do not count as failed.
-    watched : outputs of whose means the widest interval is shown.
-    stream : TextIO, by default standard error
+    watched : sequence of str
+        Outputs of whose means the widest relative interval is shown.
+    stream : TextIO, optional
+        By default standard error.
     """
 
     def __init__(
@@ -132,9 +148,9 @@ class Progress:
 
     @property
     def widest(self) -> tuple[str, float] | None:
-        """The output whose mean is known worst so far, and half its 95 % interval over the mean.
+        """The output with the widest relative interval of its mean, and the half-width.
 
-        Of the runs of this session, as if they were independent; None if nothing can be said.
+        Of the runs of this session, treated as independent; None if undefined.
         """
         known = {name: mean.relative_reach for name, mean in self._means.items()}
         finite = {name: reach for name, reach in known.items() if math.isfinite(reach)}

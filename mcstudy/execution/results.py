@@ -1,4 +1,4 @@
-"""The results folder of a study: what is written where, and how it is read back.
+"""The results folder of a study: layout, writing and reading.
 
 ::
 
@@ -79,26 +79,26 @@ class ResultsFolder:
                 self._writing = False
 
     def write_text(self, name: str, text: str) -> None:
-        """Write a text file at once: a reader sees the old one or the new one."""
+        """Write a text file atomically: a reader sees the old one or the new one."""
         target = self.path / name
         target.parent.mkdir(parents=True, exist_ok=True)
         with _replacing(target) as temporary:
-            # A path may hold bytes that are no text.
+            # A path may hold bytes that are not valid text.
             temporary.write_text(text, encoding="utf-8", errors="replace")
 
     def write_json(self, name: str, content: Any) -> None:
-        """Write a JSON file at once; NaN becomes null."""
+        """Write a JSON file atomically; NaN becomes null."""
         self.write_text(name, to_json(content))
 
     def write_frame(self, name: str, frame: pd.DataFrame) -> None:
-        """Write a Parquet file at once."""
+        """Write a Parquet file atomically."""
         target = self.path / name
         target.parent.mkdir(parents=True, exist_ok=True)
         with _replacing(target) as temporary:
             pq.write_table(pa.Table.from_pandas(frame, preserve_index=False), temporary)
 
     def _write_runs(self, name: str, frame: pd.DataFrame) -> None:
-        """Write a table of runs at once, its digest in it: what is read is that, or is torn."""
+        """Write a table of runs atomically with its digest, which detects torn files."""
         target = self.path / name
         target.parent.mkdir(parents=True, exist_ok=True)
         table = pa.Table.from_pandas(frame, preserve_index=False)
@@ -139,10 +139,10 @@ class ResultsFolder:
             try:
                 frames.append(read_runs(file))
             except FileNotFoundError:
-                # A run compacted its parts meanwhile: what they held is in the table now.
+                # Another process compacted the parts meanwhile: their runs are in the table now.
                 return self.done()
             except ValueError:
-                # A torn file is set aside, and what it held is run again.
+                # A torn file is renamed, and its runs are repeated.
                 if self._writing:
                     file.rename(file.with_suffix(".broken"))
         if not frames:
@@ -152,7 +152,7 @@ class ResultsFolder:
         return ordered
 
     def progress(self) -> tuple[int, dict[str, int]]:
-        """Return how many runs of the design are done, in the folder or its cells, by status."""
+        """Return the number of completed runs, in the folder or its cells, in all and by status."""
         design = self.design()
         counts: Counter[str] = Counter()
         for cell in design["cells"]:
@@ -166,12 +166,12 @@ class ResultsFolder:
         return counts.total(), dict(counts.most_common())
 
     def design(self) -> dict[str, Any]:
-        """Return what the manifest says of the design: ``n``, ``block`` and ``cells`` at least.
+        """Return the design from the manifest: at least ``n``, ``block`` and ``cells``.
 
         Raises
         ------
         UserError
-            If it does not say it, or not so that it can be believed.
+            If it is missing or invalid.
         """
         place = self.path / "manifest.json"
         design = self.read_json("manifest.json").get("design")
@@ -193,7 +193,8 @@ class ResultsFolder:
 
         Parameters
         ----------
-        numbers : columns of numbers that it must have.
+        numbers : sequence of str
+            Columns that must exist and hold numbers.
 
         Raises
         ------
@@ -243,7 +244,7 @@ class ResultsFolder:
         return {file.stem: pq.read_table(file).to_pandas() for file in files}
 
     def check_same_study(self, topics: Mapping[str, str]) -> None:
-        """Raise if the folder holds runs of a study that gives other numbers.
+        """Check that the folder holds no runs of a study with other numbers.
 
         Raises
         ------
@@ -267,7 +268,7 @@ def _history_folder(run: int) -> str:
 
 @contextlib.contextmanager
 def _replacing(target: Path) -> Iterator[Path]:
-    """Give a temporary path and move it over ``target`` if all went well."""
+    """Yield a temporary path and move it over ``target`` on success."""
     temporary = target.with_name(f".{target.name}.tmp")
     try:
         yield temporary
@@ -319,12 +320,27 @@ def digest(frame: pd.DataFrame) -> str:
 
 
 def status_counts(runs: pd.DataFrame) -> dict[str, int]:
-    """Return how many runs ended with each status, the most frequent first."""
+    """Return the number of runs by status, the most frequent first."""
     return {str(k): int(v) for k, v in runs["status"].value_counts().items()}
 
 
 def check_failures(counts: Mapping[str, int], failed: set[str], limit: float) -> None:
-    """Raise ``StudyError`` if the share of failed runs exceeds the study's limit."""
+    """Check the share of failed runs against the study's limit.
+
+    Parameters
+    ----------
+    counts : mapping
+        Number of runs by status.
+    failed : set of str
+        Statuses that count as failed.
+    limit : float
+        Largest share of failed runs.
+
+    Raises
+    ------
+    StudyError
+        If the share exceeds the limit.
+    """
     total = sum(counts.values())
     lost = {status: n for status, n in counts.items() if status in failed}
     share = sum(lost.values()) / total if total else 0.0

@@ -1,4 +1,4 @@
-"""The runner: an evaluator with a results folder. It keeps what arrives and resumes from it."""
+"""The runner: evaluates a task into a results folder, and resumes from it."""
 
 import contextlib
 from collections.abc import Sequence
@@ -20,12 +20,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Task:
-    """What to run.
+    """A table of runs to evaluate.
 
     Attributes
     ----------
     evaluator : of the model.
-    inputs : (n, d) rows.
+    inputs : (n, d) rows, in the model's units.
     input_names : of the d columns.
     replicate : (n,) replicate of each row.
     """
@@ -37,7 +37,7 @@ class Task:
 
 
 def run(task: Task, folder: ResultsFolder, progress: Progress) -> pd.DataFrame:
-    """Run what is missing and return the table of all runs, sorted by run id.
+    """Run the missing rows and return the table of all runs, sorted by run id.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def run(task: Task, folder: ResultsFolder, progress: Progress) -> pd.DataFrame:
     Raises
     ------
     StudyError
-        If no worker can be had, or none comes back; the chunks that arrived are kept.
+        If no worker is available, or none returns; the chunks received are kept.
     """
     n = task.inputs.shape[0]
     found = folder.done()
@@ -69,13 +69,13 @@ def run(task: Task, folder: ResultsFolder, progress: Progress) -> pd.DataFrame:
     with contextlib.suppress(OSError):
         traces.rmdir()
     runs: pd.DataFrame = pd.concat(frames, ignore_index=True)
-    # Folders of earlier versions tell no reasons.
+    # Folders of earlier versions have no reasons.
     runs["reason"] = runs["reason"].fillna("") if "reason" in runs.columns else ""
     return runs.sort_values("run", ignore_index=True)
 
 
 def _trace_folder(folder: ResultsFolder) -> Path:
-    """Return the empty folder in which workers keep what they are at."""
+    """Return the empty folder in which workers record the row under way."""
     traces = (folder.path / "running").resolve()
     traces.mkdir(parents=True, exist_ok=True)
     read_traces(traces)

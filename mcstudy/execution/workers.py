@@ -1,4 +1,4 @@
-"""Where runs are done: processes of this machine, or a cluster."""
+"""Workers: processes of this machine, or a cluster."""
 
 import contextlib
 import os
@@ -11,7 +11,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 Workers = int | str
-"""Processes of this machine (-1: one a core, two at least), or the address of a dask scheduler
+"""Processes of this machine (-1: one a core, at least two), or the address of a dask scheduler
 (``tcp://...``, or ``local`` for a cluster of this machine's own)."""
 
 
@@ -21,7 +21,8 @@ def parallel_backend(workers: Workers) -> Iterator[None]:
 
     Parameters
     ----------
-    workers : processes, -1 for one a core, or the address of a dask scheduler.
+    workers : int or str
+        Processes, -1 for one a core, or the address of a dask scheduler.
 
     Raises
     ------
@@ -29,15 +30,15 @@ def parallel_backend(workers: Workers) -> Iterator[None]:
         If the cluster's extra is not installed, or no scheduler or worker answers.
     """
     if isinstance(workers, str):
-        # Half a second of imports that only a study on a cluster needs.
+        # Imported late: it takes half a second, and only clusters need it.
         from mcstudy.execution.cluster import on_cluster
 
         with on_cluster(workers):
             yield
         return
-    # A file of the user's own in the working folder, such as signal.py, is no module of ours.
+    # A user's file in the working folder, such as signal.py, must not shadow a module.
     os.environ.setdefault("PYTHONSAFEPATH", "1")
-    # With a single process joblib runs it all here, where a crash takes the driver along.
+    # With a single process joblib runs in the driver, which a crash would end.
     n_jobs = max(2, os.cpu_count() or 1) if workers == -1 else workers
     with joblib.parallel_config(backend="loky", n_jobs=n_jobs):
         yield
@@ -46,9 +47,9 @@ def parallel_backend(workers: Workers) -> Iterator[None]:
 def run_jobs(
     function: Callable[[Item], Result], items: Iterable[Item], workers: int
 ) -> list[Result]:
-    """Return what a function gives for each item, in their order, by processes of this machine.
+    """Return the results of a function for each item, in order, computed in parallel.
 
-    For work that is no row of a model: fits, trials. Rows go through an ``Evaluator``.
+    For fits and trials; rows of a model are run by an ``Evaluator``.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Figures: one style, units on every axis, colours that the colour-blind can tell apart."""
+"""Figures: one style, units on every axis, colours safe for colour-blind readers."""

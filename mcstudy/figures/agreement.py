@@ -1,4 +1,4 @@
-"""How two methods agree: pairs, limits of agreement, what the spread is made of, what breaks it."""
+"""Agreement of two methods: pairs, limits of agreement, variance split, disagreement."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -28,12 +28,18 @@ def draw_pairs(
     labels: tuple[str, str],
     found: Mapping[str, Mapping[str, Any]],
 ) -> Figure:
-    """Return every run by two methods, one against the other, and below the limits of agreement.
+    """Return the runs of two methods against each other, and below them the limits of agreement.
 
     Parameters
     ----------
-    values : (n, 2) by output. units : by output. labels : of the two methods.
-    found : agreement by output, as in the analysis.
+    values : mapping
+        (n, 2) by output.
+    units : mapping
+        Units by output.
+    labels : (str, str)
+        Of the two methods.
+    found : mapping
+        Agreement by output, as in the analysis.
     """
     with style.styled():
         figure = style.new_figure(4.4 * len(values), 7.4)
@@ -64,7 +70,7 @@ def _scatter(axes: Axes, pair: Array, found: Mapping[str, Any]) -> None:
 
 
 def _inner(values: Array) -> tuple[float, float]:
-    """Return between which values all but the outermost 0.2 % at either end lie."""
+    """Return the 0.2 % and 99.8 % quantiles."""
     low = np.quantile(values, 0.002, method="lower")
     return float(low), float(np.quantile(values, 0.998, method="higher"))
 
@@ -96,12 +102,13 @@ def _limits(axes: Axes, pair: Array, found: Mapping[str, Any]) -> None:
 
 
 def draw_variance(split: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """Return the shares of each output's variance: inputs, method, both together.
+    """Return the shares of each output's variance: inputs, method, interaction.
 
     Parameters
     ----------
-    split : ``method``, ``inputs`` and ``together`` (value, low, high) by output, none where it does
-        not vary.
+    split : mapping
+        ``method``, ``inputs`` and ``together`` (value, low, high) by output; null where it does not
+        vary.
     """
     with style.styled():
         figure = style.new_figure(7.2, 0.62 * len(split) + 1.5)
@@ -132,11 +139,12 @@ def draw_variance(split: Mapping[str, Mapping[str, Any]]) -> Figure:
 
 
 def draw_breaking(breaking: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """Return by how much the rank correlation rises without an input's disagreement.
+    """Return the sources of disagreement: gains in rank correlation without an input's part.
 
     Parameters
     ----------
-    breaking : ``gains`` by input and ``noise`` by output, none where there is no rank correlation.
+    breaking : mapping
+        ``gains`` by input and ``noise`` by output; null where there is no rank correlation.
     """
     count = len(next(iter(breaking.values()))["gains"])
     with style.styled():
@@ -178,8 +186,14 @@ def draw_along(
 
     Parameters
     ----------
-    inputs : by output the (n,) values of the input and its axis label.
-    values : (n, 2) by output. units : by output. labels : of the two methods.
+    inputs : mapping
+        By output the (n,) values of the input and its axis label.
+    values : mapping
+        (n, 2) by output.
+    units : mapping
+        Units by output.
+    labels : (str, str)
+        Of the two methods.
     """
     with style.styled():
         figure = style.new_figure(4.4 * len(values), 3.8)

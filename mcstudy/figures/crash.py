@@ -1,4 +1,4 @@
-"""Pictures of one crash: kinematics strip, histories, animation."""
+"""Figures of one crash: kinematics strip, histories, animation."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -161,8 +161,16 @@ def draw_history(
 
     Parameters
     ----------
-    time : (n,) s. channels : (n,) values by legend label. ylabel : with unit.
-    until : s, end of the time axis. marks : times (s) of vertical lines by label.
+    time : (n,) array
+        s.
+    channels : mapping
+        (n,) values by legend label.
+    ylabel : str
+        Label with unit.
+    until : float
+        End of the time axis, s.
+    marks : mapping, optional
+        Times (s) of vertical lines by label.
     """
     with style.styled():
         figure = style.new_figure(6.4, 3.6)
@@ -193,7 +201,11 @@ def write_animation(scene: SceneLike, path: Path, *, frames: int = 120) -> None:
 
     Parameters
     ----------
-    scene : SceneLike. path : Path of the GIF. frames : int, at most.
+    scene : SceneLike
+    path : Path
+        Of the GIF.
+    frames : int
+        Largest number of frames.
     """
     chosen = _animation_frames(scene.time, frames)
     low = scene.centre[:, :, 0].min() - 0.8

@@ -1,4 +1,4 @@
-"""Pictures of a diagnosis: pulses and residuals, where the misfit is, causes, gain."""
+"""Figures of a diagnosis: pulses and residuals, location of the misfit, causes, gain."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,19 +11,21 @@ from mcstudy.figures import style
 from mcstudy.figures.panels import Band, Curve, Panel, draw_panels
 
 COLOURS = {"base": style.BLUE, "extended": style.RED}
-NAMES = {"base": "model as it stands", "extended": "extended model"}
+NAMES = {"base": "base model", "extended": "extended model"}
 LARGEST = 10.0
-"""Standard errors at which the colours of a map end."""
+"""Standard errors at which the colour scale of a map ends."""
 MIN_COUNT = 1e-3
 
 
 def draw_pulses(curves: Sequence[Mapping[str, Any]], label: str) -> Figure:
-    """Return measured and simulated pulses of some tests, and what lies between them below.
+    """Return measured and simulated pulses of some tests, with their residuals below.
 
     Parameters
     ----------
-    curves : a test each: time (s), measured, and by model mean, low, high.
-    label : of the channel, with its unit.
+    curves : sequence of mapping
+        One a test: time (s), measured, and by model mean, low, high.
+    label : str
+        Of the channel, with its unit.
     """
     upper, lower = [], []
     for entry in curves:
@@ -50,12 +52,16 @@ def draw_pulses(curves: Sequence[Mapping[str, Any]], label: str) -> Figure:
 
 
 def draw_map(where: Mapping[str, Any], labels: Mapping[str, str], regime: str) -> Figure:
-    """Return where measured and simulated differ: parts of the pulse against groups of tests.
+    """Return measured minus simulated, in standard errors, by part of the pulse and group of tests.
 
     Parameters
     ----------
-    where : regions by channel, window and group. labels : of channels.
-    regime : label of what the tests are grouped by.
+    where : mapping
+        Regions by channel, window and group.
+    labels : mapping
+        Labels of the channels.
+    regime : str
+        Label of the input by which the tests are grouped.
     """
     regions = [r for r in where["regions"] if r["channel"] in labels]
     channels = list(dict.fromkeys(r["channel"] for r in regions))
@@ -82,16 +88,16 @@ def draw_map(where: Mapping[str, Any], labels: Mapping[str, str], regime: str) -
                 first = next(r for r in own if r["group"] == group)
                 names.append(f"{first['low']:.3g} to {first['high']:.3g}")
             axes.set_yticks(rows[:-1] + 0.5, names)
-            axes.set(xlabel="time from the begin of the pulse [ms]", ylabel=regime,
+            axes.set(xlabel="time after the start of the pulse [ms]", ylabel=regime,
                      title=style.safe(labels[channel]))  # fmt: skip
             axes.grid(visible=False)
-            figure.colorbar(mesh, ax=axes, label="measured above simulated\n[standard errors]")
+            figure.colorbar(mesh, ax=axes, label="measured minus simulated\n[standard errors]")
         return figure
 
 
 def draw_evidence(effects: Sequence[Mapping[str, Any]]) -> Figure:
-    """Return the causes by evidence above the model as it stands."""
-    # What makes the model worse is as far left as it can be seen.
+    """Return the log Bayes factors of the causes over the base model."""
+    # Causes with less evidence than the base model are cut at the left limit.
     shown = list(effects)[:12]
     with style.styled():
         figure = style.new_figure(7.0, 0.34 * max(len(shown), 3) + 1.2)
@@ -102,7 +108,7 @@ def draw_evidence(effects: Sequence[Mapping[str, Any]]) -> Figure:
         places = np.arange(len(shown))
         axes.barh(places, values, color=colours, height=0.65)
         axes.set_yticks(places, [row["name"].replace("_", " ") for row in shown])
-        # A bar alone is no broader than one of three.
+        # Bars keep their height when there are fewer than three.
         axes.set_ylim(max(len(shown), 3) - 0.5, -0.5)
         axes.axvline(3.0, color="black", linestyle=":", linewidth=1.0)
         axes.set_xscale("symlog", linthresh=10.0)
@@ -111,13 +117,13 @@ def draw_evidence(effects: Sequence[Mapping[str, Any]]) -> Figure:
         ticks = [-10.0, 0.0, *(10.0**k for k in range(1, 8) if 10.0**k <= top)]
         axes.set_xticks(ticks, [f"{tick:,.0f}" for tick in ticks])
         axes.minorticks_off()
-        axes.set_xlabel("log evidence above the model as it stands [natural log units]")
+        axes.set_xlabel("log Bayes factor over the base model [natural log units]")
         axes.grid(visible=False, axis="y")
         return figure
 
 
 def draw_gain(gains: Sequence[Mapping[str, Any]], labels: Mapping[str, str]) -> Figure:
-    """Return by how much predictions of held-out tests are better, in per cent of the base."""
+    """Return the predictive gain on held-out tests in per cent of the base model's score."""
     shown = [g for g in gains if g["score"] in labels and abs(g["base"]) > MIN_COUNT]
     regions = list(dict.fromkeys(g["region"] for g in shown))
     with style.styled():
@@ -137,14 +143,22 @@ def draw_gain(gains: Sequence[Mapping[str, Any]], labels: Mapping[str, str]) -> 
             axes.invert_yaxis()
             axes.axvline(0.0, color="black", linewidth=0.8)
             axes.xaxis.set_major_locator(MaxNLocator(5))
-            axes.set(xlabel="better than the model as it stands [%]",
+            axes.set(xlabel="improvement over the base model [%]",
                      title=f"{region} the speeds used")  # fmt: skip
             axes.legend(fontsize=8, loc="best")
         return figure
 
 
 def draw_conclusions(base: Mapping[str, Any], extended: Mapping[str, Any], label: str) -> Figure:
-    """Return what the extension changes: exceedance of the output, and what drives it."""
+    """Return exceedance of the output and first-order indices, base against extended model.
+
+    Parameters
+    ----------
+    base, extended : mapping
+        ``values``, ``limit`` (base) and ``drivers`` (value, low, high by input).
+    label : str
+        Of the output, with its unit.
+    """
     with style.styled():
         figure = style.new_figure(9.5, 3.8)
         left, right = figure.subplots(1, 2)
@@ -173,7 +187,7 @@ def draw_conclusions(base: Mapping[str, Any], extended: Mapping[str, Any], label
 def draw_scalars(
     rows: Mapping[str, Sequence[Mapping[str, Any]]], labels: Mapping[str, str]
 ) -> Figure:
-    """Return measured against simulated scalars, bars of two standard errors."""
+    """Return measured against simulated scalars, with bars of two standard errors."""
     names = [name for name in rows if rows[name]]
     with style.styled():
         figure = style.new_figure(4.2 * min(len(names), 3), 3.6 * -(-len(names) // 3))

@@ -23,7 +23,7 @@ class Mark:
     kind: str
 
     def shown_with(self, values: np.ndarray) -> str:
-        """Return the label in a legend; it tells of a mark too far from values to be drawn."""
+        """Return the legend label, which notes a mark too far from the values to be drawn."""
         label = style.safe(self.label)
         if style.is_near(values, self.value):
             return label
@@ -47,8 +47,13 @@ def draw_distributions(
 
     Parameters
     ----------
-    runs : table of runs. units : outputs to draw and their units.
-    marks : values to mark by output. analysis : ``outputs`` of the analysis, for the intervals.
+    runs : DataFrame
+    units : mapping
+        Outputs to draw and their units.
+    marks : mapping
+        Values to mark by output.
+    analysis : mapping
+        ``outputs`` of the analysis, for the intervals.
     """
     with style.styled():
         figure = style.new_figure(4.4 * len(units), 6.6)
@@ -69,7 +74,7 @@ def draw_distributions(
 def _histogram(
     axes: Axes, values: np.ndarray, analysis: Mapping[str, Any], marks: Sequence[Mark]
 ) -> None:
-    # The last 0.2 per cent on either side would squeeze the rest.
+    # The outermost 0.2 per cent on either side would compress the rest.
     low = np.quantile(values, 0.002, method="lower")
     high = np.quantile(values, 0.998, method="higher")
     shown = values[(values >= low) & (values <= high)]
@@ -105,12 +110,12 @@ def _interval(axes: Axes, quantiles: Mapping[str, Mapping[str, Any]]) -> None:
 
 
 def _cumulative(axes: Axes, values: np.ndarray, marks: Sequence[Mark]) -> None:
-    # From one end of the axis to the other, or a value that all runs share would show no step.
+    # From one end of the axis to the other, so that a constant output shows its step.
     low, high = axes.get_xlim()
     ordered = np.concatenate([[min(low, values.min())], np.sort(values), [max(high, values.max())]])
     share = np.concatenate([np.arange(values.size + 1) / values.size, [1.0]])
     axes.step(ordered, share, color=style.BLUE, where="post")
-    # Dvoretzky-Kiefer-Wolfowitz band: holds for the whole curve at once.
+    # Dvoretzky-Kiefer-Wolfowitz band: simultaneous for the whole curve.
     band = np.sqrt(np.log(2.0 / 0.05) / (2.0 * values.size))
     axes.fill_between(
         ordered,

@@ -1,4 +1,4 @@
-"""Where in the space of inputs runs fail."""
+"""Location of failed runs in the input space."""
 
 from collections.abc import Mapping, Sequence
 

@@ -1,4 +1,4 @@
-"""Panels of curves, bands and points: ours beside references."""
+"""Panels of curves, bands and points: simulations beside references."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -41,7 +41,7 @@ class Band:
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes: labels with units, curves and bands, limits from 0 where asked."""
+    """One pair of axes: labels with units, curves, bands, optional limits."""
 
     xlabel: str
     ylabel: str
@@ -56,7 +56,16 @@ class Panel:
 def draw_panels(
     panels: Sequence[Panel], *, columns: int = 2, width: float = 4.8, height: float = 3.6
 ) -> Figure:
-    """Return a figure of panels, ``columns`` in a row, each ``width`` by ``height`` inches."""
+    """Return a figure of panels.
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+    columns : int
+        Panels in a row.
+    width, height : float
+        Size of a panel, inches.
+    """
     columns = min(columns, len(panels))
     rows = -(-len(panels) // columns)
     with style.styled():
@@ -70,9 +79,9 @@ def draw_panels(
 
 
 def use_log_scale(axes: Axes, which: Literal["x", "y"]) -> None:
-    """Give axes a logarithmic scale along x or y, its ticks in plain numbers.
+    """Give axes a logarithmic scale along x or y with ticks in plain numbers.
 
-    The house's style takes dollar signs as text, so powers of ten would stand there as code.
+    The style does not parse dollar signs, so powers of ten would be printed as source text.
     """
     axes.set(**{f"{which}scale": "log"})
     axis = axes.xaxis if which == "x" else axes.yaxis
@@ -102,5 +111,5 @@ def _draw(axes: Axes, panel: Panel) -> None:
 
 
 def _label(drawn: Curve | Band) -> str | None:
-    """Return what the legend says of a curve or band, if anything."""
+    """Return the legend label of a curve or band, if any."""
     return style.safe(drawn.label) if drawn.label else None

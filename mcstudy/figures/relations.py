@@ -1,4 +1,4 @@
-"""How outputs go with inputs and with each other."""
+"""Associations of outputs with inputs and with each other."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -19,12 +19,14 @@ def draw_correlations(correlations: pd.DataFrame, noise: float) -> Figure:
 
     Parameters
     ----------
-    correlations : rows inputs, columns outputs, NaN where there is none.
-    noise : |rho| below which 95 % of unrelated inputs fall; such cells are printed grey.
+    correlations : DataFrame
+        Rows inputs, columns outputs, NaN where undefined.
+    noise : float
+        Largest absolute rho of 95 % of unrelated inputs; smaller ones are printed grey.
     """
     with style.styled():
         figure = style.new_figure(
-            # As high as the label of the colours is long, at least.
+            # High enough for the label of the colour bar.
             1.35 * len(correlations.columns) + 2.6,
             max(0.36 * len(correlations) + 1.6, 3.2),
         )
@@ -61,7 +63,20 @@ def draw_against_input(
     units: Mapping[str, str],
     marks: Mapping[str, Sequence[Mark]],
 ) -> Figure:
-    """Return each output against one input, with the running median and 90 % band."""
+    """Return each output against one input, with the running median and 90 % band.
+
+    Parameters
+    ----------
+    runs : DataFrame
+    column : str
+        Name of the input.
+    input_label : str
+        Axis label, with unit.
+    units : mapping
+        Outputs to draw and their units.
+    marks : mapping
+        Values to mark by output.
+    """
     with style.styled():
         figure = style.new_figure(4.4 * len(units), 3.8)
         row = figure.subplots(1, len(units), squeeze=False)[0]
@@ -109,11 +124,15 @@ def _band(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
 def draw_joint(
     runs: pd.DataFrame, first: tuple[str, str], second: tuple[str, str], point: Mapping[str, float]
 ) -> Figure:
-    """Return two outputs against each other with contours and the accident's own point.
+    """Return two outputs against each other with density contours and the accident's values.
 
     Parameters
     ----------
-    runs : table. first, second : name and unit. point : the accident's values, may be empty.
+    runs : DataFrame
+    first, second : (str, str)
+        Name and unit of an output.
+    point : mapping
+        Values of the accident by output, may be empty.
     """
     with style.styled():
         figure = style.new_figure(5.4, 4.4)
@@ -148,7 +167,7 @@ def draw_joint(
 
 
 def _spreads(pair: np.ndarray) -> bool:
-    """Tell whether points lie in a plane, not on a line or in one place."""
+    """Return whether points spread in two dimensions, not along a line or at one point."""
     if not (varies(pair[:, 0]) and varies(pair[:, 1])):
         return False
     return bool(abs(np.corrcoef(pair.T)[0, 1]) < 1.0 - 1e-9)
@@ -157,7 +176,15 @@ def _spreads(pair: np.ndarray) -> bool:
 def draw_convergence(
     tables: Mapping[str, Sequence[Mapping[str, float]]], units: Mapping[str, str]
 ) -> Figure:
-    """Return the medians over growing parts of the study, of which each output has one or more."""
+    """Return the medians of each output over growing parts of the study.
+
+    Parameters
+    ----------
+    tables : mapping
+        ``n`` and ``value`` of each part by output, at least one output.
+    units : mapping
+        Units by output.
+    """
     with style.styled():
         figure = style.new_figure(4.4 * len(tables), 2.9)
         row = figure.subplots(1, len(tables), squeeze=False)[0]

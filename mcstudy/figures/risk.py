@@ -1,4 +1,4 @@
-"""Risk of injury as the field draws it: against a stimulus, with bands, cases and levels."""
+"""Figures of injury risk: against a stimulus, with bands, cases and levels."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,18 +13,22 @@ from mcstudy.figures import style
 Array = NDArray[np.float64]
 
 DASHES = ("--", ":", "-.", (0, (6, 2, 1, 2, 1, 2)), (0, (1, 4)))
-"""Of published curves, all grey."""
+"""Line styles of published curves, all grey."""
 LEVEL_COLOURS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7", "#000000")
-"""Of AIS1 to AIS6, of Okabe and Ito's palette."""
+"""Colours of AIS1 to AIS6, from Okabe and Ito's palette."""
 
 
 def draw_risk_curve(analysis: Mapping[str, Any], xlabel: str, title: str) -> Figure:
-    """Return a fitted risk curve with its band, cases, steps and lines at 5, 25 and 50 %.
+    """Return a fitted risk curve with band, cases, Turnbull's estimate, lines at 5, 25, 50 %.
 
     Parameters
     ----------
-    analysis : of ``mcstudy.injury.risk_curve.describe_risk``.
-    xlabel : stimulus and unit. title : injury.
+    analysis : mapping
+        As returned by ``mcstudy.injury.risk_curve.describe_risk``.
+    xlabel : str
+        Stimulus and unit.
+    title : str
+        Injury.
     """
     with style.styled():
         figure = style.new_figure(7.6, 4.8)
@@ -72,13 +76,20 @@ def draw_levels(
     xlabel: str,
     limit: float | None = None,
 ) -> Figure:
-    """Return published curves by AIS level over the study's density of the stimulus.
+    """Return published curves by AIS level above the study's density of the stimulus.
 
     Parameters
     ----------
-    curves : by title of the risk function, risk at ``x`` by level.
-    x : grid. stimulus : (n,) of the study's runs, finite.
-    xlabel : stimulus and unit. limit : drawn as a line, if any.
+    curves : mapping
+        Risk at ``x`` by level, by title of the risk function.
+    x : (k,) array
+        Grid of the stimulus.
+    stimulus : (n,) array
+        Of the study's runs, finite.
+    xlabel : str
+        Stimulus and unit.
+    limit : float, optional
+        Limit of the stimulus, drawn as a line.
     """
     dashes = ("-", "--", ":", "-.")
     with style.styled():
@@ -88,7 +99,7 @@ def draw_levels(
             for level, risk in levels.items():
                 above.plot(x, risk, color=LEVEL_COLOURS[level - 1], linestyle=dashes[k % 4],
                            linewidth=1.5, label=f"AIS{level}+, {title}")  # fmt: skip
-        # As weights: Matplotlib's own density takes differences of edges, which may vanish.
+        # As weights: Matplotlib's own density divides by differences of edges, which may vanish.
         end, bins = float(x[-1]), 60
         below.hist(stimulus, bins=bins, color=style.SKY, range=(0.0, end),
                    weights=np.full(stimulus.size, bins / (end * stimulus.size)))  # fmt: skip
@@ -110,12 +121,15 @@ def draw_speed_risk(
     published: Mapping[str, tuple[Array, Array]],
     title: str,
 ) -> Figure:
-    """Return risk against impact speed with bands, published curves beside it.
+    """Return risk against impact speed with bands, and published curves.
 
     Parameters
     ----------
-    bands : by label ``speed`` (km/h), ``risk``, ``low``, ``high``.
-    published : by label speed and risk.
+    bands : mapping
+        ``speed`` (km/h), ``risk``, ``low``, ``high`` by label.
+    published : mapping
+        Speed (km/h) and risk by label.
+    title : str
     """
     with style.styled():
         figure = style.new_figure(8.2, 6.2)
@@ -168,12 +182,16 @@ def draw_roc(
     marks: Mapping[str, tuple[float, float]],
     label: str,
 ) -> Figure:
-    """Return sensitivity over false alarms, with a limit marked on each curve.
+    """Return ROC curves with a limit marked on each.
 
     Parameters
     ----------
-    curves : by title false alarms and sensitivity. marks : of the limit, by the same titles.
-    label : of the limit.
+    curves : mapping
+        False-alarm rate and sensitivity by title.
+    marks : mapping
+        The same of the limit, by title.
+    label : str
+        Of the limit.
     """
     with style.styled():
         figure = style.new_figure(6.4, 5.6)
@@ -192,12 +210,16 @@ def draw_roc(
 
 
 def draw_exceedance(samples: Mapping[str, Array], xlabel: str, limit: float) -> Figure:
-    """Return the share of runs above each value, with a 95 % band for the whole curve.
+    """Return the share of runs above each value, with a simultaneous 95 % band.
 
     Parameters
     ----------
-    samples : (n,) by label; NaN counts as never above. xlabel : output and unit.
-    limit : drawn as a line.
+    samples : mapping
+        (n,) by label; NaN counts as never above.
+    xlabel : str
+        Output and unit.
+    limit : float
+        Limit of the output, drawn as a line.
     """
     with style.styled():
         figure = style.new_figure(7.2, 4.2)
@@ -207,7 +229,7 @@ def draw_exceedance(samples: Mapping[str, Array], xlabel: str, limit: float) -> 
             held = np.sort(sample[np.isfinite(sample)])
             share = np.arange(held.size, -1, -1) / sample.size
             held = np.concatenate([[0.0], held])
-            # Dvoretzky, Kiefer and Wolfowitz: for the whole curve at once.
+            # Dvoretzky, Kiefer and Wolfowitz: simultaneous for the whole curve.
             reach = float(np.sqrt(np.log(2.0 / 0.05) / (2.0 * sample.size)))
             colour = style.PALETTE[k % len(style.PALETTE)]
             axes.fill_between(held, np.clip(share - reach, 0, 1), np.clip(share + reach, 0, 1),

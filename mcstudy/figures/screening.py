@@ -1,4 +1,4 @@
-"""Rankings of many inputs: elementary effects, and measures of any sample."""
+"""Rankings of many inputs: elementary effects and given-data measures."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,16 +14,18 @@ from mcstudy.figures.sensitivity import column
 Array = NDArray[np.float64]
 
 NAMED = 8
-"""Factors that the scatter of elementary effects names, the largest."""
+"""Number of factors labelled in the scatter plot of elementary effects, the largest."""
 
 
 def draw_mean_effects(outputs: Mapping[str, Mapping[str, Any]], dummy: str) -> Figure:
-    """Return the mean size of the elementary effects of each factor, a panel an output.
+    """Return mu* of the elementary effects of each factor, a panel an output.
 
     Parameters
     ----------
-    outputs : ``unit`` and ``factors`` (value, low, high, clear by factor) by output.
-    dummy : the factor that stands for none.
+    outputs : mapping
+        ``unit`` and ``factors`` (value, low, high, clear by factor) by output.
+    dummy : str
+        Name of the dummy factor.
     """
     count = len(next(iter(outputs.values()))["factors"])
     with style.styled():
@@ -40,7 +42,16 @@ def draw_mean_effects(outputs: Mapping[str, Mapping[str, Any]], dummy: str) -> F
 
 
 def draw_ranking(axes: Axes, table: Mapping[str, Mapping[str, Any]], noise: float) -> None:
-    """Draw bars with intervals from the largest down, grey where not clear of noise."""
+    """Draw bars with intervals in descending order, grey where not above the noise line.
+
+    Parameters
+    ----------
+    axes : Axes
+    table : mapping
+        Value, low, high and clear by name.
+    noise : float
+        Noise line, from the dummy.
+    """
     order = sorted(table, key=lambda name: table[name]["value"])
     values, low, high = (column(table, order, key) for key in ("value", "low", "high"))
     places = np.arange(len(order))
@@ -57,7 +68,7 @@ def draw_ranking(axes: Axes, table: Mapping[str, Mapping[str, Any]], noise: floa
 
 
 def draw_elementary_effects(outputs: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """Return scatter over mean size of the elementary effects, a panel an output."""
+    """Return sigma against mu* of the elementary effects, a panel an output."""
     with style.styled():
         figure = style.new_figure(4.3 * len(outputs), 3.9)
         row = figure.subplots(1, len(outputs), squeeze=False)[0]
@@ -86,7 +97,7 @@ def draw_elementary_effects(outputs: Mapping[str, Mapping[str, Any]]) -> Figure:
 
 
 def _spread_labels(x: Array, y: Array, width: float, gap: float) -> Array:
-    """Return heights of labels at (x, y) moved up where they would lie on another one."""
+    """Return heights of labels at (x, y), moved up where they would overlap."""
     placed = np.array(y)
     order = np.argsort(y)
     for k, index in enumerate(order):
@@ -102,8 +113,10 @@ def draw_given_data(measures: Mapping[str, Mapping[str, Any]], titles: Mapping[s
 
     Parameters
     ----------
-    measures : ``inputs`` (value, low, high, clear by input) and ``noise`` by measure.
-    titles : label of the axis by measure.
+    measures : mapping
+        ``inputs`` (value, low, high, clear by input) and ``noise`` by measure.
+    titles : mapping
+        Axis label by measure.
     """
     count = len(next(iter(measures.values()))["inputs"])
     with style.styled():

@@ -22,8 +22,10 @@ def draw_indices(outputs: Mapping[str, Mapping[str, Any]], dummy: str) -> Figure
 
     Parameters
     ----------
-    outputs : ``first`` and ``total`` (value, low, high by factor) by output.
-    dummy : name of the factor that stands for none; its total index is the noise line.
+    outputs : mapping
+        ``first`` and ``total`` (value, low, high by factor) by output.
+    dummy : str
+        Name of the dummy factor; the upper bound of its total index is the noise line.
     """
     count = len(next(iter(outputs.values()))["total"])
     with style.styled():
@@ -60,12 +62,22 @@ def _bars(axes: Axes, entry: Mapping[str, Any], dummy: str) -> None:
 
 
 def column(table: Mapping[str, Mapping[str, Any]], order: Sequence[str], key: str) -> Array:
-    """Return one number of each row in the order given, NaN for null."""
+    """Return one entry of each row in the given order, NaN for null.
+
+    Parameters
+    ----------
+    table : mapping
+        Rows by name.
+    order : sequence of str
+        Names of the rows.
+    key : str
+        Name of the entry.
+    """
     return np.array([table[name][key] for name in order], dtype=float)
 
 
 def draw_heatmap(outputs: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """Return total indices of all outputs by factor; hatched: of an output that does not vary."""
+    """Return total indices of all outputs by factor; outputs that do not vary are hatched."""
     table = pd.DataFrame(
         {
             name: {factor: row["value"] for factor, row in entry["total"].items()}
@@ -76,7 +88,7 @@ def draw_heatmap(outputs: Mapping[str, Mapping[str, Any]]) -> Figure:
     with style.styled():
         figure = style.new_figure(
             0.62 * table.shape[1] + 3.4,
-            # As high as the label of the colours is long, at least.
+            # High enough for the label of the colour bar.
             max(0.34 * table.shape[0] + 1.6, 3.6),
         )
         axes = figure.subplots()
@@ -96,7 +108,16 @@ def draw_heatmap(outputs: Mapping[str, Mapping[str, Any]]) -> Figure:
 
 
 def draw_second_order(entry: Mapping[str, Any], factors: Sequence[str], title: str) -> Figure:
-    """Return the matrix of second-order indices of one output; grey: not distinct from zero."""
+    """Return the matrix of second-order indices of one output; grey: not distinct from zero.
+
+    Parameters
+    ----------
+    entry : mapping
+        ``second`` (value, low, high) by pair of factors.
+    factors : sequence of str
+        Names of the factors.
+    title : str
+    """
     size = len(factors)
     values, distinct = np.full((size, size), np.nan), np.zeros((size, size), dtype=bool)
     for i, a in enumerate(factors):
@@ -135,8 +156,10 @@ def draw_main_effects(effects: Mapping[str, Mapping[str, Any]], ylabel: str) -> 
 
     Parameters
     ----------
-    effects : ``unit``, ``x``, ``mean``, ``error``, ``low`` and ``high`` by input.
-    ylabel : of the output.
+    effects : mapping
+        ``unit``, ``x``, ``mean``, ``error``, ``low`` and ``high`` by input.
+    ylabel : str
+        Label of the output, with its unit.
     """
     columns = min(4, len(effects))
     rows = -(-len(effects) // columns)
@@ -163,7 +186,7 @@ def draw_main_effects(effects: Mapping[str, Mapping[str, Any]], ylabel: str) -> 
 
 
 MAX_LINES = 7
-"""Factors that the convergence figure follows, the largest."""
+"""Number of factors in the convergence figure, the largest."""
 
 
 def draw_convergence(convergence: Mapping[str, Sequence[Mapping[str, Any]]]) -> Figure:

@@ -1,4 +1,4 @@
-"""Force against penetration: measured loops, fitted curves, corridors and what comes of them."""
+"""Force against penetration: measured loops, fitted curves, corridors and the resulting HIC15."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ def draw_force_penetration(loops: Mapping[str, tuple[Array, Array]]) -> Figure:
 
 @dataclass(frozen=True)
 class FittedLoop:
-    """A measured loop and what was fitted to it: m and N."""
+    """A measured loop and its fitted curve: m and N."""
 
     name: str
     depth: Array
@@ -45,9 +45,9 @@ class FittedLoop:
 
 
 ENTRY = 1.75
-"""Inches that an entry of a legend takes."""
+"""Width of a legend entry, inches."""
 MAX_PANELS = 12
-"""Tests that get a panel of their own."""
+"""Largest number of tests with a panel."""
 
 
 def _panels(count: int, width: float, height: float) -> tuple[Figure, list[Axes]]:
@@ -122,13 +122,18 @@ def draw_corridor(
     coordinates: Array,
     hic: Mapping[str, Array],
 ) -> Figure:
-    """Return a stiffness corridor and the HIC15 that comes of it.
+    """Return a stiffness corridor and the resulting HIC15.
 
     Parameters
     ----------
-    corridor : penetration (m) and force (N) of ``lower``, ``median``, ``upper``.
-    curves : of single tests, may be empty.
-    coordinates : (k,) of the corridor. hic : HIC15 (k,) by label.
+    corridor : mapping
+        Penetration (m) and force (N) of ``lower``, ``median``, ``upper``.
+    curves : sequence of (penetration, force)
+        Of single tests (m, N), may be empty.
+    coordinates : (k,) array
+        Of the corridor, 0 to 1.
+    hic : mapping
+        HIC15 (k,) by label.
     """
     with style.styled():
         figure = style.new_figure(9.2, 3.7)

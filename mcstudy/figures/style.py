@@ -1,4 +1,4 @@
-"""The one style of all figures."""
+"""The common style of all figures."""
 
 import functools
 import io
@@ -39,7 +39,7 @@ _RC: dict[str, Any] = {
     "svg.fonttype": "path",
     "svg.hashsalt": "mcstudy",
     "figure.dpi": 110,
-    # Titles and names come from study files: a dollar sign in them is no formula.
+    # Titles and names come from study files: a dollar sign in them starts no formula.
     "text.parse_math": False,
 }
 
@@ -57,9 +57,9 @@ LABELS = {
     "friction_tyre_road": "friction tyre–road",
 }
 LINE, TICK, LINES = 44, 28, 3
-"""Characters of a line of a label and of a tick's, and lines after which one is cut."""
+"""Characters a line of a label and of a tick label, and largest number of lines."""
 MAX_SCORE = 1e4
-"""Times the size of what is drawn that a reference may be away to be drawn with it (assumed)."""
+"""Largest size of a reference, over that of the values, to be drawn with them (assumed)."""
 _NO_WIDTH = "\N{ZERO WIDTH SPACE}"
 _UNIT_TEXT = {"1": "", "m/s2": "m/s²", "rad/s2": "rad/s²"}
 
@@ -82,14 +82,16 @@ def words(name: str) -> str:
 
 
 def safe(text: str, line: int = LINE) -> str:
-    """Return a text that a person wrote as figures can draw it: as label, title or tick.
+    """Return a user's text in drawable form, for a label, title or tick.
 
-    It is wrapped and, where it is very long, cut; what no font has is drawn as U+FFFD, and nothing
-    at all as a dash.
+    It is wrapped and, where it is very long, cut; characters that no font has become U+FFFD, and an
+    empty text becomes a dash.
 
     Parameters
     ----------
-    text : any. line : characters of a line.
+    text : str
+    line : int
+        Characters a line.
     """
     drawn = _drawable()
     plain = "".join(
@@ -105,7 +107,7 @@ def safe(text: str, line: int = LINE) -> str:
 
 
 def quantity(name: str) -> str:
-    """Return the name of an input, output or group in words, as figures can draw it at an axis."""
+    """Return the name of an input, output or group in words, drawable as a tick label."""
     return safe(words(name), TICK)
 
 
@@ -123,12 +125,16 @@ def _drawable() -> frozenset[int]:
 def ends_of(
     values: ArrayLike, points: Sequence[float] = (), *, below: float = 0.05, above: float = 0.05
 ) -> tuple[float, float]:
-    """Return the ends of an axis that holds values, also where they do not vary.
+    """Return the limits of an axis for values, also where they do not vary.
 
     Parameters
     ----------
-    values : finite. points : held as well, those that ``is_near`` the values.
-    below, above : room, in shares of the axis.
+    values : array
+        Finite.
+    points : sequence of float
+        Reference values to include where they are near (``is_near``) the values.
+    below, above : float
+        Margins, in shares of the axis.
     """
     held: NDArray[np.float64] = np.asarray(values, dtype=float).ravel()
     held = np.concatenate([held, [point for point in points if is_near(held, point)]])
@@ -140,19 +146,19 @@ def ends_of(
 
 
 def is_near(values: ArrayLike, point: float) -> bool:
-    """Tell whether a point can be drawn on one axis with values without hiding them."""
+    """Return whether a point can share an axis with values without hiding them."""
     return abs(point) <= MAX_SCORE * (float(np.abs(np.asarray(values)).max()) or 1.0)
 
 
 def covered(axes: Axes, height: float) -> float:
-    """Return the share of axes, ``height`` inches high, that a small legend of theirs covers."""
+    """Return the share of axes, ``height`` inches high, that their small legend covers."""
     labels: list[str] = axes.get_legend_handles_labels()[1]
     lines = sum(1 + label.count("\n") for label in labels)
     return min(0.17 * lines / height, 0.7)
 
 
 def mark_missing(axes: Axes, missing: NDArray[np.bool_]) -> None:
-    """Hatch the cells of a heat map that have no value, and give them a dash."""
+    """Hatch the cells of a heat map without a value and print a dash in them."""
     for row, column in zip(*np.nonzero(missing), strict=True):
         axes.add_patch(
             Rectangle((column, row), 1.0, 1.0, facecolor="#F4F4F4", edgecolor="#C4C4C4",
@@ -163,14 +169,14 @@ def mark_missing(axes: Axes, missing: NDArray[np.bool_]) -> None:
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw in the project's style, leaving the user's own settings alone."""
+    """Apply the project's style within the context; the user's settings are restored."""
     settings: Any = {**_RC, "axes.prop_cycle": cycler(color=PALETTE)}
     with sns.axes_style("ticks"), mpl.rc_context(settings):
         yield
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return a figure (inches) that belongs to no window."""
+    """Return a figure (inches) without a window."""
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
@@ -181,7 +187,10 @@ def save(figures: Mapping[str, Figure], folder: Path) -> None:
 
     Parameters
     ----------
-    figures : by file name without ending. folder : Path, created.
+    figures : mapping
+        Figures by file name without extension.
+    folder : Path
+        Created if missing.
     """
     folder.mkdir(parents=True, exist_ok=True)
     with styled():

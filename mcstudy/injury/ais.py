@@ -1,9 +1,9 @@
-"""From stimuli to AIS: probability of each level by mechanism, and drawn outcomes.
+"""From stimuli to AIS: probability of each level by mechanism, and sampled outcomes.
 
 A *mechanism* is one way to be injured, such as a blow to the head or its rotation, with one or more
-risk functions between which nobody can choose: the choice is an uncertain input with weights. The
-*head* takes the worse of its mechanisms. How they go together is not known; taking the larger
-probability (they go together) is the lower bound, taking them as independent the upper one.
+candidate risk functions: the choice between them is an uncertain input with weights. The *head*
+takes the worse of its mechanisms. Their dependence is unknown; the larger probability (full
+dependence) is the lower bound, independence the upper one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,7 +26,8 @@ class Mechanism:
 
     Attributes
     ----------
-    name : for the report. functions : (risk function, weight) pairs, weights positive.
+    name : for the report.
+    functions : (risk function, weight) pairs, weights positive.
     """
 
     name: str
@@ -36,11 +37,15 @@ class Mechanism:
 def exceedance(function: RiskFunction, stimulus: Array, age: Array) -> Array:
     """Return P(AIS >= k) for k = 1 to 6 by one risk function, shape (n, 6).
 
-    Levels that the function lacks are NaN. A stimulus of NaN is a blow that did not happen: risk 0.
+    Levels that the function lacks are NaN. A stimulus of NaN means no blow: risk 0.
 
     Parameters
     ----------
-    function : RiskFunction. stimulus : (n,). age : (n,) years.
+    function : RiskFunction
+    stimulus : (n,) array
+        In the function's unit.
+    age : (n,) array
+        Years.
     """
     found = np.full((stimulus.size, HIGHEST_LEVEL), np.nan)
     for level in function.levels:
@@ -52,13 +57,17 @@ def exceedance(function: RiskFunction, stimulus: Array, age: Array) -> Array:
 def mix(mechanism: Mechanism, outputs: Mapping[str, Array], age: Array) -> Array:
     """Return P(AIS >= k) of a mechanism, its risk functions weighted, shape (n, 6).
 
-    Every level is the weighted mean of the functions that have it, but never more than the level
-    below, which other functions may have. A level that none has takes the risk of the next worse
-    one that some have, or zero above them all.
+    Every level is the weighted mean of the functions that have it, capped at the level below, which
+    other functions may have. A level that no function has takes the risk of the next higher level
+    that some have, or zero above them all.
 
     Parameters
     ----------
-    mechanism : Mechanism. outputs : (n,) by name. age : (n,) years.
+    mechanism : Mechanism
+    outputs : mapping
+        (n,) stimuli by name.
+    age : (n,) array
+        Years.
     """
     total = np.zeros((age.size, HIGHEST_LEVEL))
     weights = np.zeros(HIGHEST_LEVEL)
@@ -81,8 +90,10 @@ def combine(
 
     Parameters
     ----------
-    mechanisms : (n, 6) each.
-    together : ``dependent`` takes the largest, ``independent`` one minus the product of the rest.
+    mechanisms : sequence of (n, 6) array
+        P(AIS >= k) of each.
+    together : {"dependent", "independent"}
+        The largest probability, or one minus the product of the complements.
     """
     stacked = np.stack(mechanisms)
     if together == "dependent":
@@ -91,7 +102,7 @@ def combine(
 
 
 def distribution(exceeding: Array) -> Array:
-    """Return P(AIS = k) for k = 0 to 6 of P(AIS >= k), shape (..., 7)."""
+    """Return P(AIS = k) for k = 0 to 6 from P(AIS >= k), shape (..., 7)."""
     ends = np.zeros((*exceeding.shape[:-1], 1))
     reached, passed = (np.concatenate(p, -1) for p in ([1.0 + ends, exceeding], [exceeding, ends]))
     return np.asarray(reached - passed)
@@ -102,6 +113,9 @@ def draw_ais(exceeding: Array, uniforms: Array) -> NDArray[np.int64]:
 
     Parameters
     ----------
-    exceeding : (n, 6). uniforms : (n,); the same ones for two scenarios make them comparable.
+    exceeding : (n, 6) array
+        P(AIS >= k).
+    uniforms : (n,) array
+        In (0, 1); the same ones in two scenarios are common random numbers.
     """
     return np.asarray(np.sum(uniforms[:, None] < exceeding, axis=1))

@@ -1,4 +1,4 @@
-"""What goes with the AIS: rank correlations with intervals, and proportional-odds regression."""
+"""Association with the AIS: rank correlations with intervals, proportional-odds regression."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 RESAMPLES = 200
 STEEPEST = 50.0
-"""Slope per standard deviation that no data with overlap give (assumed)."""
+"""Slope per standard deviation above which outcomes count as separated (assumed)."""
 
 
 def rank_correlations(
@@ -25,7 +25,12 @@ def rank_correlations(
 
     Parameters
     ----------
-    values : (n,) finite. levels : (n,). rng : of the resamples.
+    values : (n,) array
+        Finite.
+    levels : (n,) array of int
+        AIS.
+    rng : Generator
+        Of the resamples.
 
     Raises
     ------
@@ -36,7 +41,7 @@ def rank_correlations(
         raise ValueError("all outcomes are the same")
     found = {}
     drawn = (rng.integers(0, values.size, values.size) for _ in range(RESAMPLES))
-    # A resample of one outcome alone has no correlation.
+    # A resample with a single outcome has no correlation.
     parts = [part for part in drawn if np.unique(levels[part]).size > 1]
     for name, measure in (("spearman", _spearman), ("kendall", _kendall)):
         value = measure(values, levels)
@@ -65,9 +70,11 @@ class OrdinalFit:
 
     Attributes
     ----------
-    names : predictors. slopes : (p,) per standard deviation. errors : (p,) standard errors.
-    cuts : between the levels that occur. log_likelihood, null_log_likelihood : with and without
-        predictors.
+    names : of the p predictors.
+    slopes : (p,) per standard deviation of the predictor.
+    errors : (p,) standard errors of the slopes.
+    cuts : between the levels that occur.
+    log_likelihood, null_log_likelihood : with and without predictors.
     """
 
     names: tuple[str, ...]
@@ -78,7 +85,13 @@ class OrdinalFit:
     null_log_likelihood: float
 
     def odds_ratio(self, name: str) -> Estimate:
-        """Return by what a standard deviation of a predictor multiplies the odds of a worse AIS."""
+        """Return the odds ratio of a worse AIS per standard deviation of a predictor.
+
+        Raises
+        ------
+        ValueError
+            If the name is no predictor.
+        """
         if name not in self.names:
             raise ValueError(f"{name!r} is no predictor, only {', '.join(self.names)}")
         k = self.names.index(name)
@@ -87,17 +100,20 @@ class OrdinalFit:
 
 
 def fit_proportional_odds(predictors: Mapping[str, Array], levels: NDArray[np.int64]) -> OrdinalFit:
-    """Return the proportional-odds regression of greatest likelihood (P. McCullagh, 1980).
+    """Return the maximum-likelihood proportional-odds regression (P. McCullagh, 1980).
 
     Parameters
     ----------
-    predictors : (n,) finite by name. levels : (n,) of at least two different values.
+    predictors : mapping
+        (n,) finite by name.
+    levels : (n,) array of int
+        AIS, at least two different values.
 
     Raises
     ------
     ValueError
-        If all levels are the same, a predictor does not vary or is not finite, predictors repeat
-        each other, or they tell the levels apart completely.
+        If all levels are the same, a predictor does not vary or is not finite, predictors are
+        collinear, or they separate the levels completely.
     """
     names = tuple(predictors)
     columns = [np.asarray(predictors[name], dtype=float) for name in names]
@@ -115,7 +131,7 @@ def fit_proportional_odds(predictors: Mapping[str, Array], levels: NDArray[np.in
         raise ValueError("predictors repeat each other")
     shares = np.cumsum(np.bincount(codes))[:-1] / codes.size
     cuts = special.logit(shares)
-    # Cuts as the first one and logarithms of the gaps keep them in order.
+    # First cut and logarithms of the gaps: this parametrisation keeps the cuts in order.
     start = np.concatenate([np.zeros(len(names)), cuts[:1], np.log(np.diff(cuts))])
     found = optimize.minimize(
         _ordinal_loss, start, args=(z, codes), jac=True, method="BFGS", options={"gtol": 1e-7}
@@ -143,7 +159,7 @@ def _ordinal_loss(x: Array, z: Array, codes: NDArray[np.intp]) -> tuple[float, A
     shift = z @ x[:p]
     ends = np.concatenate([[-np.inf], cuts, [np.inf]])
     high, low = ends[codes + 1] - shift, ends[codes] - shift
-    # P(level) = expit(high) - expit(low), from the tail in which it keeps its digits.
+    # P(level) = expit(high) - expit(low), from the tail without cancellation.
     flip = low > 0.0
     top, bottom = np.where(flip, -low, high), np.where(flip, -high, low)
     share = np.maximum(special.expit(top) - special.expit(bottom), 1e-300)

@@ -1,4 +1,4 @@
-"""Tables of cases: one row a case, its stimulus and whether it was injured."""
+"""Tables of cases: one row a case, with stimulus and injury outcome."""
 
 import numbers
 from pathlib import Path
@@ -26,7 +26,10 @@ def read_cases(path: Path, stimulus: str) -> pd.DataFrame:
 
     Parameters
     ----------
-    path : of the table. stimulus : column that the risk depends on.
+    path : Path
+        Of the table.
+    stimulus : str
+        Column that the risk depends on.
 
     Returns
     -------
@@ -66,7 +69,7 @@ def read_parquet(path: Path) -> pd.DataFrame:
     except OSError as error:
         raise UserError(f"{path}: cannot be read ({error})") from None
     except Exception as error:
-        # What the library raises for a damaged file is of no one kind.
+        # The library raises various exceptions for a damaged file.
         raise UserError(f"{path}: is no Parquet table ({str(error)[:200]})") from None
     if table.columns.duplicated().any():
         raise UserError(f"{path}: names a column twice")
@@ -78,12 +81,17 @@ def observations_of(table: pd.DataFrame, stimulus: str, level: int, source: str)
 
     Parameters
     ----------
-    table : with either a column ``stimulus`` and ``injured`` (0 or 1) or ``ais``, and where wanted
+    table : DataFrame
+        With either a column ``stimulus`` and ``injured`` (0 or 1) or ``ais``, and optionally
         ``exact`` (1 where the stimulus of injury was measured); or columns ``<stimulus>_low`` and
-        ``<stimulus>_high`` (empty or infinite: open). ``weight`` tells how many cases a row stands
+        ``<stimulus>_high`` (empty or infinite: open). ``weight`` holds how many cases a row stands
         for.
-    stimulus : column. level : AIS that counts as injured where the table has ``ais``.
-    source : name for messages.
+    stimulus : str
+        Name of the column.
+    level : int
+        AIS that counts as injured where the table has ``ais``.
+    source : str
+        Name for messages.
 
     Raises
     ------
@@ -115,7 +123,7 @@ def observations_of(table: pd.DataFrame, stimulus: str, level: int, source: str)
 
 
 def _numbers(table: pd.DataFrame, name: str) -> Array:
-    """Return a column as numbers, NaN where nothing is."""
+    """Return a column as numbers, NaN where it is empty."""
     if name not in table.columns:
         raise ValueError(f"has no column {name!r}; it has {', '.join(map(str, table.columns))}")
     found = np.full(len(table), np.nan)
@@ -128,7 +136,7 @@ def _numbers(table: pd.DataFrame, name: str) -> Array:
 
 
 def _number(value: Any) -> float | None:
-    """Return a number, NaN for nothing, None for what is neither."""
+    """Return a number, NaN for an empty field, None for anything else."""
     if value is None or value is pd.NA or value is pd.NaT:
         return np.nan
     if isinstance(value, bool | np.bool_):
@@ -155,7 +163,7 @@ def _levels(table: pd.DataFrame) -> Array:
 
 
 def _flags(table: pd.DataFrame, name: str, *, empty: bool = False) -> NDArray[np.bool_]:
-    """Return which cases say yes; with ``empty``, one that says nothing says no."""
+    """Return the flags of the cases; with ``empty``, an empty field counts as no."""
     words = [str(value).strip().lower() for value in table[name]]
     allowed = {*_YES, *_NO, *(("", *_MISSING) if empty else ())}
     for k, word in enumerate(words):

@@ -1,7 +1,7 @@
-"""A limit as a classifier of injury: how well HIC 700 tells who is hurt.
+"""A limit as a classifier of injury, such as HIC 700.
 
-Outcomes are probabilities, not drawn cases: each run counts as injured with its risk and as
-uninjured with the rest, which leaves the chance of drawing out of the numbers.
+Outcomes are probabilities, not sampled cases: each run counts as injured with its risk and as
+uninjured with the complement, which removes sampling noise of the outcomes.
 """
 
 from dataclasses import dataclass
@@ -14,13 +14,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Limit:
-    """What a limit does.
+    """Performance of a limit as a classifier.
 
     Attributes
     ----------
-    value : of the stimulus. sensitivity : share of the injured above it. specificity : share of
-    the uninjured below it. positive, negative : predictive values, the risk above the limit and the
-    share of uninjured below it; NaN where nobody is.
+    value : of the stimulus.
+    sensitivity : share of the injured above the limit.
+    specificity : share of the uninjured below it.
+    positive : predictive value, the risk above the limit; NaN if nobody is above.
+    negative : predictive value, the share of uninjured below it; NaN if nobody is below.
     """
 
     value: float
@@ -46,8 +48,14 @@ def judge_limit(stimulus: Array, risk: Array, limit: float, weight: Array | None
 
     Parameters
     ----------
-    stimulus : (n,), NaN counts as below. risk : (n,) of injury. limit : of the stimulus.
-    weight : (n,) of each run, by default equal.
+    stimulus : (n,) array
+        NaN counts as below.
+    risk : (n,) array
+        Probability of injury.
+    limit : float
+        Of the stimulus.
+    weight : (n,) array, optional
+        Of each run, by default equal.
     """
     w = np.ones(risk.size) if weight is None else weight
     hurt, spare = w * risk, w * (1.0 - risk)
@@ -66,22 +74,26 @@ def judge_limit(stimulus: Array, risk: Array, limit: float, weight: Array | None
 def receiver_operating_characteristic(
     stimulus: Array, risk: Array, weight: Array | None = None
 ) -> Roc:
-    """Return the curve over all limits, the area below it and the best limit (Youden's J).
+    """Return the ROC curve over all limits, its area and the best limit (Youden's J).
 
     Parameters
     ----------
-    stimulus : (n,), NaN counts as lowest. risk : (n,) of injury, neither all 0 nor all 1.
-    weight : (n,) of each run, by default equal.
+    stimulus : (n,) array
+        NaN counts as lowest.
+    risk : (n,) array
+        Probability of injury, neither all 0 nor all 1.
+    weight : (n,) array, optional
+        Of each run, by default equal.
     """
     w = np.ones(risk.size) if weight is None else weight
     held = np.nan_to_num(stimulus, nan=-np.inf)
     order = np.argsort(-held, kind="stable")
     x, hurt, spare = held[order], (w * risk)[order], (w * (1.0 - risk))[order]
-    # Runs of the same stimulus pass together.
+    # Runs of equal stimulus form one step of the curve.
     last = np.append(np.flatnonzero(x[1:] != x[:-1]), x.size - 1)
     hits = np.concatenate([[0.0], np.cumsum(hurt)[last] / hurt.sum()])
     alarms = np.concatenate([[0.0], np.cumsum(spare)[last] / spare.sum()])
-    # A limit half-way to the next lower stimulus leaves just these above it.
+    # A limit half-way to the next lower stimulus separates them from the rest.
     below = np.append(x[last[:-1] + 1], -np.inf)
     limits = np.concatenate([x[:1], np.where(np.isinf(below), below, 0.5 * (x[last] + below))])
     best = int(np.argmax(hits - alarms))

@@ -20,7 +20,7 @@ HIGHEST_LEVEL = 6
 
 @dataclass(frozen=True)
 class Level:
-    """Parameters of one AIS level, and where they were read: found, recalled, estimated."""
+    """Parameters of one AIS level, and their source label: found, recalled or estimated."""
 
     parameters: tuple[float, ...]
     label: str
@@ -45,8 +45,12 @@ class RiskFunction:
 
         Parameters
         ----------
-        level : AIS level that the function has. stimulus : (n,), NaN gives NaN.
-        age : (n,) years; tolerance is carried from the adult's by the function's scaling.
+        level : int
+            AIS level that the function has.
+        stimulus : (n,) array
+            In the function's unit; NaN gives NaN.
+        age : (n,) array
+            Years; the function's scaling transfers the adult's tolerance to this age.
 
         Raises
         ------

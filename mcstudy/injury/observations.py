@@ -1,9 +1,9 @@
-"""Observations of injury: at what stimulus it happened, as far as it is known.
+"""Observations of injury: the stimulus at which it occurred, as an interval.
 
-Every case is an interval in which the stimulus of injury lies: an injured one that is only known to
-have tolerated less is *left-censored* (0, x); an uninjured one *right-censored* (x, infinity); a
-case in which the moment of injury was measured is *exact* (x, x); and one between two tests of the
-same subject is *interval-censored* (low, high).
+The stimulus of injury of every case lies in an interval: an injured case known only to have
+tolerated less is *left-censored* (0, x); an uninjured one *right-censored* (x, infinity); a case in
+which the moment of injury was measured is *exact* (x, x); and one between two tests of the same
+subject is *interval-censored* (low, high).
 """
 
 from dataclasses import dataclass
@@ -15,20 +15,20 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 SMALLEST, LARGEST = 1e-100, 1e100
-"""Stimuli beyond which a number is taken for a mistake (assumed)."""
+"""Range of stimuli; a number beyond it counts as a mistake (assumed)."""
 UNEQUAL = 1e9
-"""Ratio of two weights beyond which one of them is taken for a mistake (assumed)."""
+"""Ratio of two weights beyond which one of them counts as a mistake (assumed)."""
 
 
 @dataclass(frozen=True)
 class Observations:
-    """Intervals of the stimulus at which injury sets in.
+    """Intervals of the stimulus at which injury occurs.
 
     Attributes
     ----------
     low, high : (n,) bounds; ``low`` 0 for left-censored, ``high`` infinite for right-censored,
         equal for exact cases.
-    weight : (n,) how many cases each row stands for; None if each is one.
+    weight : (n,) number of cases that each row stands for; None if each is one.
     """
 
     low: Array
@@ -42,7 +42,7 @@ class Observations:
 
     @property
     def weights(self) -> Array:
-        """How many cases each row stands for."""
+        """Number of cases that each row stands for."""
         return np.ones(self.size) if self.weight is None else self.weight
 
     @property
@@ -79,9 +79,13 @@ def observe(
 
     Parameters
     ----------
-    stimulus : (n,) positive. injured : (n,).
-    exact : (n,) injured cases whose stimulus of injury was measured; by default none.
-    weight : (n,) how many cases each row stands for; by default one.
+    stimulus : (n,) array
+        Positive.
+    injured : (n,) array of bool
+    exact : (n,) array of bool, optional
+        Injured cases whose stimulus of injury was measured; by default none.
+    weight : (n,) array, optional
+        Number of cases that each row stands for; by default one.
 
     Raises
     ------
@@ -105,8 +109,8 @@ def check(observations: Observations) -> Observations:
     Raises
     ------
     ValueError
-        If a stimulus is not a positive number, an interval is empty or open on both sides, there is
-        nothing but one class, or one stimulus fits all cases.
+        If a stimulus is not a positive number, an interval is empty or open on both sides, all
+        cases are of one class, or the classes are completely separated.
     """
     low, high, weights = observations.low, observations.high, observations.weights
     for k in range(observations.size):
@@ -135,9 +139,11 @@ def check(observations: Observations) -> Observations:
     if observations.size < 3:
         raise ValueError(f"{observations.size} cases are too few for a risk curve")
     if np.all(low == 0.0):
-        raise ValueError("all cases are injured: where risk begins cannot be told; add uninjured")
+        raise ValueError(
+            "all cases are injured: the onset of risk is unidentifiable; add uninjured"
+        )
     if not observations.injured.any():
-        raise ValueError("no case is injured: where risk begins cannot be told; add injured")
+        raise ValueError("no case is injured: the onset of risk is unidentifiable; add injured")
     if high.min() >= low.max():
         raise ValueError(
             f"the uninjured (up to {low.max():g}) and the injured (from {high.min():g}) do not "

@@ -1,4 +1,4 @@
-"""A risk curve with all that ISO/TS 18506 asks to report beside it."""
+"""A risk curve with the quantities that ISO/TS 18506 requires in its report."""
 
 from typing import Any
 
@@ -20,14 +20,14 @@ Array = NDArray[np.float64]
 
 GRID = 200
 MAX_REFITTED = 300
-"""Cases up to which each is left out once to see what it does."""
+"""Largest number of cases for which each is left out once (influence)."""
 INFLUENCE_SHOWN = 5
 INFLUENTIAL = 1.0
 """Standard errors by which leaving out one case may move the curve (assumed)."""
 
 
 def describe_risk(observations: Observations) -> dict[str, Any]:
-    """Return the fits of all families, the best one in full, and the estimate without a family.
+    """Return the fits of all families, details of the best one, and Turnbull's estimate.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def describe_risk(observations: Observations) -> dict[str, Any]:
 
 
 def _fit_families(observations: Observations) -> list[RiskFit]:
-    """Return the curves of the families that the observations allow, best first."""
+    """Return the fits of the families that the observations allow, best first."""
     fits, refusal = [], None
     for family in FAMILIES:
         try:
@@ -94,7 +94,7 @@ def _at(fit: RiskFit, risk: float) -> dict[str, Any]:
 
 
 def _influence(observations: Observations, fit: RiskFit) -> dict[str, Any] | None:
-    """Return what leaving out a case does to the curve, largest first.
+    """Return the influence of leaving out each case on the curve, largest first.
 
     The shift is that of the stimulus at 5, 25 or 50 % risk, whichever moves most, in standard
     errors of the curve without the case.
@@ -107,7 +107,7 @@ def _influence(observations: Observations, fit: RiskFit) -> dict[str, Any] | Non
         try:
             refitted = fit_risk_curve(observations.without(k), fit.family)
         except ValueError:
-            # Without this case there is no curve at all.
+            # Without this case no curve can be fitted.
             continue
         centre, reach = np.transpose([refitted.log_stimulus_at(p) for p in QUALITY_AT])
         moved = (centre - before) / (reach / REACH)

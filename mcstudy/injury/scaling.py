@@ -1,14 +1,15 @@
-"""Carrying an adult's risk to a child: by what factor a child's stimulus counts as an adult's.
+"""Age scaling of adult risk functions: a child's tolerance relative to the adult's.
 
 - ``hic``: tolerance of HIC by age relative to the adult. EEVC's factors of the Q dummies: 0.49 at
   birth, 0.45 at 1 year, 0.53 at 1.5, 0.71 at 3, 0.98 at 6 years (J. Wismans et al., EEVC 2008
   [found]); 1 from 10 years on [assumed]; linear between.
-- ``brain_acceleration`` and ``brain_rate``: tolerance of angular acceleration goes with the brain's
-  mass to the power -2/3, that of angular velocity with -1/3 (A. Ommaya et al. 1967 [recalled]).
+- ``brain_acceleration`` and ``brain_rate``: tolerance of angular acceleration scales with the
+  brain's mass to the power -2/3, that of angular velocity with -1/3 (A. Ommaya et al. 1967
+  [recalled]).
   Brain mass by age: 1.10 kg up to 3 years [assumed; an infant's is far less], 1.25 at 7, 1.40 from
   18 on [estimated]; linear between.
 
-The BrIC is a ratio of angular velocities and goes with ``brain_rate``.
+The BrIC is a ratio of angular velocities and scales with ``brain_rate``.
 """
 
 from collections.abc import Callable
@@ -25,11 +26,14 @@ ADULT_BRAIN = 1.40
 
 
 def tolerance_factor(scaling: str, age: Array | float) -> Array:
-    """Return a person's tolerance over the adult's: the risk is that of stimulus over factor.
+    """Return the tolerance relative to the adult's, by which the stimulus is divided.
 
     Parameters
     ----------
-    scaling : ``hic``, ``brain_acceleration``, ``brain_rate`` or ``none``. age : (n,) years.
+    scaling : str
+        ``hic``, ``brain_acceleration``, ``brain_rate`` or ``none``.
+    age : (n,) array or float
+        Years.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""Injury-risk curves fitted to censored data, as ISO/TS 18506 asks for: survival analysis.
+"""Injury-risk curves fitted to censored data by survival analysis, as ISO/TS 18506 requires.
 
-Risk is the distribution of the stimulus x at which injury sets in, one of three families in its
+Risk is the distribution of the stimulus x at which injury occurs, one of three families in its
 logarithm, F(x) = G(z) with z = intercept + slope ln x (ISO/TS 18506:2014; A. Petitjean et al.,
 Stapp Car Crash Journal 53, 2009):
 
@@ -11,10 +11,10 @@ of it is concave in intercept and slope, so Newton's method finds the one maximu
 only left- and right-censored it is that of a probit, logit or complementary log-log regression on
 ln x.
 
-Rows may have weights. Whole numbers count equal cases, and give what the cases would give one by
-one. Others are shares of a population (survey weights): the curve is that of the weighted
+Rows may have weights. Whole numbers count equal cases, and give the result of repeated rows.
+Others are shares of a population (survey weights): the curve is that of the weighted
 likelihood, its covariance the sandwich H^-1 (sum w^2 g g') H^-1 of the rows' gradients g (H. White,
-Econometrica 50, 1982), which does not depend on what the weights add up to.
+Econometrica 50, 1982), which is independent of the sum of the weights.
 """
 
 from dataclasses import dataclass
@@ -30,21 +30,21 @@ Array = NDArray[np.float64]
 
 FAMILIES = ("log-normal", "log-logistic", "Weibull")
 NARROW = 1e-6
-"""Width in ln x below which an interval is taken as a density times its width (assumed)."""
+"""Width in ln x below which an interval's probability is density times width (assumed)."""
 QUALITY_AT = (0.05, 0.25, 0.5)
 """Risks at which the quality index is given (ISO/TS 18506)."""
 QUALITY_CLASSES = ((0.5, "good"), (1.0, "fair"), (1.5, "marginal"), (np.inf, "unacceptable"))
-"""Width of the interval over the stimulus, up to which a curve is called so (ISO/TS 18506)."""
+"""Largest relative width of the interval for each quality class (ISO/TS 18506)."""
 
 NARROWEST = 1e-5
 """Spread of ln x below which stimuli differ by rounding alone (assumed)."""
 STEEPEST = 1e4
-"""Slope in ln x from which on risk jumps, all within 0.1 % of a stimulus (assumed)."""
-_TOO_STEEP = "risk jumps at one stimulus, and its slope cannot be told: no curve is given"
+"""Slope in ln x above which risk rises within 0.1 % of a stimulus (assumed)."""
+_TOO_STEEP = "risk jumps at one stimulus, and its slope is not identifiable: no curve is given"
 LARGEST_LOG_RATIO = 300.0
-"""ln of a density over a share, above which both are so small that nothing of them is known."""
+"""ln of density over probability above which both have underflowed."""
 UNFINISHED = 0.01
-"""Standard errors that the search may end short of the greatest likelihood (assumed)."""
+"""Largest distance from the maximum of the likelihood, in standard errors (assumed)."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,10 @@ class RiskFit:
 
     Attributes
     ----------
-    family : one of ``FAMILIES``. intercept, slope : of z in ln x.
-    covariance : (2, 2) of intercept and slope. log_likelihood : float, weighted.
+    family : one of ``FAMILIES``.
+    intercept, slope : of z in ln x.
+    covariance : (2, 2) of intercept and slope.
+    log_likelihood : weighted.
     cases : number of rows.
     """
 
@@ -92,28 +94,30 @@ class RiskFit:
         """Return the stimulus of a risk with its 95 % interval, normal in ln x."""
         centre, reach = self.log_stimulus_at(risk)
         with np.errstate(over="ignore"):
-            # Of a curve that hardly rises the interval has no end that a number can hold.
+            # The interval of a nearly flat curve may overflow.
             value, low, high = np.exp([centre, centre - reach, centre + reach]).tolist()
         return value, low, high
 
     def quality_index(self, risk: float) -> float:
         """Return the width of the stimulus's interval over the stimulus (ISO/TS 18506)."""
-        # The bounds are the stimulus over and times one factor; it may itself be too small to tell.
+        # The bounds are the stimulus over and times one factor; the stimulus may underflow.
         with np.errstate(over="ignore"):
             return float(2.0 * np.sinh(self.log_stimulus_at(risk)[1]))
 
 
 def quality_class(index: float) -> str:
-    """Return what ISO/TS 18506 calls a quality index."""
+    """Return the quality class of a quality index (ISO/TS 18506)."""
     return next(name for limit, name in QUALITY_CLASSES if index <= limit)
 
 
 def fit_risk_curve(observations: Observations, family: str) -> RiskFit:
-    """Return the risk curve of greatest likelihood.
+    """Return the maximum-likelihood risk curve.
 
     Parameters
     ----------
-    observations : Observations. family : one of ``FAMILIES``.
+    observations : Observations
+    family : str
+        One of ``FAMILIES``.
 
     Raises
     ------
@@ -127,8 +131,8 @@ def fit_risk_curve(observations: Observations, family: str) -> RiskFit:
     with np.errstate(divide="ignore"):
         low, high = np.log(observations.low), np.log(observations.high)
     exact, weights = observations.exact, observations.weights
-    # Of the two bounds of a narrow interval no digits are left of their difference in risk: it is
-    # the density in its middle times its width.
+    # The difference in risk over a narrow interval cancels: it is computed as the density in its
+    # middle times its width.
     held = np.isfinite(high) & np.isfinite(low)
     span = np.where(held, observations.high - observations.low, np.inf)
     span = np.log1p(span / np.where(held, observations.low, 1.0))
@@ -138,8 +142,8 @@ def fit_risk_curve(observations: Observations, family: str) -> RiskFit:
     middle, spread = float(y.mean()), float(y.std())
     width = spread if spread > NARROWEST else 1.0
 
-    # Centred and scaled, so that the two parameters hardly depend on each other; the weights to a
-    # mean of one, so that the search ends at the same place whatever they count.
+    # Centred and scaled to decorrelate the two parameters; weights of mean one make the tolerance
+    # of the search independent of their unit.
     place = np.where(narrow, 0.5 * (low + high), high)
     cases = _Cases((low - middle) / width, (place - middle) / width, point,
                    weights / weights.mean())  # fmt: skip
@@ -151,8 +155,8 @@ def fit_risk_curve(observations: Observations, family: str) -> RiskFit:
     def curvature(p: Array) -> Array:
         return -_likelihood(family, p, cases)[2]
 
-    # At the middle of the stimuli the share of the injured, kept from 0 and 1, is a start of
-    # finite likelihood whatever the censoring.
+    # The share of the injured, kept from 0 and 1, at the mean stimulus has a finite likelihood
+    # under any censoring.
     share = float(observations.injured.mean())
     rim = 0.5 / observations.size
     start: Array = np.array([_score(family, min(max(share, rim), 1.0 - rim)), 1.0])
@@ -166,14 +170,14 @@ def fit_risk_curve(observations: Observations, family: str) -> RiskFit:
     except np.linalg.LinAlgError:
         inverse = np.full((2, 2), np.nan)
     if not (np.all(np.isfinite(inverse)) and np.all(np.diag(inverse) > 0.0)):
-        raise ValueError("the cases do not tell where and how fast risk rises: no curve is given")
+        raise ValueError("the cases do not identify position and slope: no curve is given")
     ahead = gradient.sum(axis=1)
     if ahead @ inverse @ ahead > UNFINISHED**2:
         raise ValueError(_TOO_STEEP)
     scaled = inverse if observations.counted else inverse @ (gradient @ gradient.T) @ inverse
     if observations.counted:
         scaled = scaled / weights.mean()
-    # Back to ln x: z = a + b (y - middle) / width.
+    # Transformed to ln x: z = a + b (y - middle) / width.
     back = np.array([[1.0, -middle / width], [0.0, 1.0 / width]])
     intercept, slope = back @ best
     if slope > STEEPEST:
@@ -189,7 +193,7 @@ def fit_risk_curve(observations: Observations, family: str) -> RiskFit:
 
 @dataclass(frozen=True)
 class _Cases:
-    """Bounds (n,) in scaled ln x, the upper that of exact cases (n,), which these are, weights."""
+    """Bounds (n,) in scaled ln x, which cases are exact (value in ``high``), and weights."""
 
     low: Array
     high: Array
@@ -221,7 +225,7 @@ def _likelihood(family: str, parameters: Array, cases: _Cases) -> tuple[float, A
     log_share = _log_between(family, y1, y2, a, b)
     total += float(w @ log_share)
     if not np.isfinite(total):
-        # Outside of what is possible: an interval of no share.
+        # Infeasible parameters: an interval has zero probability.
         return -np.inf, gradient, -np.eye(2)
     sides = []
     for y in (y1, y2):
@@ -242,7 +246,7 @@ def _likelihood(family: str, parameters: Array, cases: _Cases) -> tuple[float, A
 
 
 def _log_between(family: str, y1: Array, y2: Array, a: float, b: float) -> Array:
-    """Return ln(F(y2) - F(y1)), from the tail in which it keeps its digits."""
+    """Return ln(F(y2) - F(y1)), from the tail without cancellation."""
     z1 = np.where(np.isfinite(y1), a + b * np.where(np.isfinite(y1), y1, 0.0), -np.inf)
     z2 = np.where(np.isfinite(y2), a + b * np.where(np.isfinite(y2), y2, 0.0), np.inf)
     low1, up1 = _log_tails(family, z1)

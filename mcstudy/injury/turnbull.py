@@ -1,4 +1,4 @@
-"""The risk without an assumed family: Turnbull's estimate.
+"""Turnbull's non-parametric estimate of the risk.
 
 Self-consistent shares of the innermost intervals (B. Turnbull, Journal of the Royal Statistical
 Society B 38, 1976); for data that are only left- and right-censored the same as isotonic regression
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 MAX_STEPS = 2_000
 TOLERANCE = 1e-9
-"""Largest change of a share in a step at which it has settled."""
+"""Largest change of a share in a step at which the iteration has converged."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,8 @@ class StepRisk:
 
     Attributes
     ----------
-    low, high : (m,) intervals of the stimulus in which risk rises. share : (m,) by how much.
+    low, high : (m,) intervals of the stimulus in which risk rises.
+    share : (m,) rise of the risk in each interval.
     """
 
     low: Array
@@ -71,14 +72,14 @@ def estimate_steps(observations: Observations) -> StepRisk:
 
 
 def _redistribute(inside: NDArray[np.bool_], weight: Array, share: Array) -> Array:
-    """Return the shares that cases give to the intervals within their bounds."""
+    """Return the shares after one step of self-consistency."""
     return np.asarray(share * (inside.T @ (weight / (inside @ share))))
 
 
 def _extrapolate(
     inside: NDArray[np.bool_], weight: Array, share: Array, once: Array, twice: Array
 ) -> Array:
-    """Return where two steps of self-consistency lead, or the second where that is less likely.
+    """Return the extrapolation of two self-consistency steps, or the second if more likely.
 
     Squared extrapolation of R. Varadhan and C. Roland, Scandinavian Journal of Statistics 35, 2008.
     """
@@ -115,9 +116,9 @@ def _isotonic(observations: Observations) -> StepRisk:
 
 
 def _innermost(low: Array, high: Array) -> tuple[Array, Array]:
-    """Return Turnbull's intervals: a lower bound followed at once by an upper bound."""
-    # At one value an exact case comes first, then the ends of intervals, which hold it, then those
-    # that begin there, which do not.
+    """Return Turnbull's intervals: a lower bound directly followed by an upper bound."""
+    # Ties: exact cases first, then ends of intervals, which contain the value, then beginnings,
+    # which do not.
     marks = sorted(
         [(a, 0 if a == b else 3, "low") for a, b in zip(low, high, strict=True)]
         + [(b, 1 if a == b else 2, "high") for a, b in zip(low, high, strict=True)]

@@ -40,9 +40,9 @@ EMPTY = "leave a field empty where nothing was measured"
 MIN_SAMPLES = 8
 """Samples below which a signal cannot be used."""
 FINEST, COARSEST = 1e-8, 1.0
-"""s between samples that a recorder of a crash can have (assumed)."""
+"""s, range of the sampling interval of a crash recorder (assumed)."""
 LARGEST = 1e9
-"""Number above which a sample of a signal, in whatever unit, is a mistake (assumed)."""
+"""Largest sample of a signal, in any unit; a larger one counts as a mistake (assumed)."""
 
 
 class _Table(BaseModel):
@@ -88,12 +88,12 @@ class Measured:
 
     Attributes
     ----------
-    source : Path, where they came from.
-    header : Header
+    source : path of the data.
+    header : contents of ``measured.toml``.
     tests : table, a row a test: ``test`` and the columns of inputs and scalars, in the header's
         units; NaN where a scalar was not measured.
     signals : by test and channel, (n, 2) time (s) and value in the channel's unit.
-    notes : what was taken and left out where there was a choice, by test.
+    notes : choices among channels, taken and left out, by test.
     """
 
     source: Path
@@ -103,9 +103,18 @@ class Measured:
     notes: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def input_value(self, name: str, test: int, unit: str) -> tuple[float, float] | None:
-        """Return a recorded input of row ``test`` and its standard uncertainty in ``unit``.
+        """Return a recorded input of a test and its standard uncertainty.
 
         A value fixed for all tests is exact; None if the input is neither recorded nor fixed.
+
+        Parameters
+        ----------
+        name : str
+            Of the input.
+        test : int
+            Row of the test.
+        unit : str
+            Unit of the result.
 
         Raises
         ------
@@ -123,7 +132,16 @@ class Measured:
         return (float(fixed), 0.0) if isinstance(fixed, float | int) else None
 
     def signal(self, test: str, name: str, unit: str) -> tuple[Array, Array]:
-        """Return time (s) and values in ``unit`` of a channel of a test.
+        """Return time (s) and values of a channel of a test.
+
+        Parameters
+        ----------
+        test : str
+            Name of the test.
+        name : str
+            Name of the channel.
+        unit : str
+            Unit of the values.
 
         Raises
         ------
@@ -145,9 +163,10 @@ def load_measured(folder: Path | str, channels: Sequence[str] = ()) -> Measured:
 
     Parameters
     ----------
-    folder : of the data.
-    channels : of ISO-MME tests, which to take; see
-        ``mcstudy.measurement.isomme.head_acceleration``.
+    folder : Path or str
+        Of the data.
+    channels : sequence of str
+        Channels to take of ISO-MME tests; see ``mcstudy.measurement.isomme.head_acceleration``.
 
     Raises
     ------
@@ -246,7 +265,7 @@ def _series(path: Path, frame: pd.DataFrame, name: str) -> Array:
 
 
 def _check_samples(place: str, time: Array, values: Array) -> None:
-    """Refuse times and values that no recorder has, and with which nothing can be computed."""
+    """Refuse implausible times and values, with which nothing can be computed."""
     step = float(time[-1] - time[0]) / (time.size - 1)
     if not FINEST <= step <= COARSEST:
         raise UserError(
@@ -254,14 +273,14 @@ def _check_samples(place: str, time: Array, values: Array) -> None:
             "possible: times must be in s"
         )
     if np.any(np.diff(time) <= 0.0):
-        raise UserError(f"{place}: its times are larger than their steps can be told")
+        raise UserError(f"{place}: its times are too large to resolve their steps")
     worst = float(values[np.argmax(np.abs(values))])
     if abs(worst) > LARGEST:
         raise UserError(f"{place}: holds {worst:.3g}, no sample is above {LARGEST:g}")
 
 
 def _frame(table: TextTable) -> pd.DataFrame:
-    """Return a table whose columns are numbers but for those of text, by line of the file."""
+    """Return a table of numbers, except for columns of text, indexed by line of the file."""
     columns = {
         name: fields if name in table.text else table.numbers(name, advice=EMPTY)
         for name, fields in table.columns.items()
@@ -270,7 +289,7 @@ def _frame(table: TextTable) -> pd.DataFrame:
 
 
 def _check_unit(place: Path, key: str, name: str) -> None:
-    """Refuse a unit that no quantity has."""
+    """Refuse an unknown unit."""
     known = units.unit_names()
     if name not in known:
         raise UserError(

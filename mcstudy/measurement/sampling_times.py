@@ -1,4 +1,4 @@
-"""Times of samples as files print them: uniform within the last digit is uniform."""
+"""Sampling times from printed digits: uniform within the last digit counts as uniform."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,25 +6,26 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 MAX_DIGITS = 12
-"""Decimals of a second up to which printed digits are sought."""
+"""Largest number of printed decimals of a second."""
 EXACT = 1e-9
-"""Share of a step within which times are uniform as they are."""
+"""Deviation from a uniform grid, as a share of a step, that counts as none."""
 ROUNDED = 1.0
-"""Printed units by which times may lie away from a uniform grid: half of one is rounding, the rest
-what the grid's two numbers leave."""
+"""Largest deviation from a uniform grid in printed units: half of one is rounding, the rest the
+uncertainty of start and step."""
 STEP_IN_UNITS = 1.5
-"""Printed units in a step from which a missing line shows in the steps: two steps then print at
-least two units longer than the shortest."""
+"""Smallest step in printed units for which a missing line is detectable: the double step then
+prints at least two units longer than the shortest."""
 
 
 def regular_times(time: Array) -> Array:
-    """Return times on the uniform grid that they were rounded from, or as they are.
+    """Return times on the uniform grid that they were rounded from, else unchanged.
 
     Steps between rounded times differ by one printed unit at most; a missing line makes one longer.
 
     Parameters
     ----------
-    time : (n,) s, rising.
+    time : (n,) array
+        s, rising.
     """
     if time.size < 3:
         return time

@@ -1,4 +1,4 @@
-"""A report as data, rendered to one HTML file that opens without a network."""
+"""A report as data, rendered to one self-contained HTML file."""
 
 import base64
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ from mcstudy.figures.style import png_bytes
 
 @dataclass(frozen=True)
 class Table:
-    """A table: caption, head, rows of ready text."""
+    """A table: caption, head, rows of formatted text."""
 
     caption: str
     head: Sequence[str]
@@ -32,7 +32,14 @@ class Section:
 
 
 def render(title: str, subtitle: str, sections: Sequence[Section]) -> str:
-    """Return the HTML of a report; all text is escaped."""
+    """Return the HTML of a report; all text is escaped.
+
+    Parameters
+    ----------
+    title : str
+    subtitle : str
+    sections : sequence of Section
+    """
     source = files("mcstudy.report").joinpath("template.html").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     shown = [

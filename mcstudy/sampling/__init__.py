@@ -1,1 +1,1 @@
-"""Where in the unit cube a study samples."""
+"""Sampling designs in the unit cube."""

@@ -1,8 +1,8 @@
-"""Designs: where in the unit cube the samples lie.
+"""Designs: samples in the unit cube.
 
 A design is a sequence of independent *replicates*. Sample i belongs to replicate
 ``i // replicate_size`` and depends on the seed and that replicate alone, so a larger n extends a
-design without changing what was run. Intervals come from the spread between replicates; plain
+design without changing earlier samples. Intervals come from the variance between replicates; plain
 Monte Carlo needs none, its samples are independent.
 """
 
@@ -44,10 +44,14 @@ def draw(method: str, n: int, replicate_size: int, dimensions: int, seed: int) -
 
     Parameters
     ----------
-    method : key of ``METHODS``.
-    n : number of samples, a multiple of ``replicate_size``.
-    replicate_size : samples of one independent replicate.
-    dimensions, seed : int
+    method : str
+        Key of ``METHODS``.
+    n : int
+        Number of samples, a multiple of ``replicate_size``.
+    replicate_size : int
+        Samples of one independent replicate.
+    dimensions : int
+    seed : int
     """
     blocks = [
         METHODS[method](replicate_size, dimensions, seeds.generator(seed, seeds.DESIGN, r))

@@ -1,8 +1,8 @@
-"""Factors: what a design exchanges. Single inputs, groups of inputs, and a dummy.
+"""Factors of a design: single inputs, groups of inputs, and a dummy.
 
-The *dummy* stands for no input. It nudges all of them by a ten-thousandth of their range: an output
-that follows its inputs smoothly does not feel it, a chaotic one does. What a study finds for the
-dummy is thus the model's noise floor and the noise line of every ranking.
+The *dummy* stands for no input. It perturbs all of them by a ten-thousandth of their range: a
+smooth output does not respond, a chaotic one does. The dummy's index is thus the model's noise
+floor and the noise line of every ranking.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,13 +15,13 @@ Array = NDArray[np.float64]
 DUMMY = "dummy"
 """Name of the factor that stands for no input."""
 PERTURBATION = 1e-4
-"""By how much of its range in probability the dummy moves an input (assumed)."""
+"""Perturbation of an input by the dummy, in probability (assumed)."""
 _TURN = 0.6180339887498949
-"""Share of a turn between the nudges of two inputs (golden ratio: no two go together)."""
+"""Phase between the perturbations of two inputs, in turns (golden ratio: none coincide)."""
 
 
 def factors_of(inputs: Sequence[str], groups: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
-    """Return what is exchanged: groups at the place of their first input, single inputs, dummy."""
+    """Return the factors: groups at the place of their first input, single inputs, dummy."""
     return tuple(dict.fromkeys([*_memberships(inputs, groups), DUMMY]))
 
 
@@ -39,7 +39,7 @@ def salib_problem(
 
 
 def perturbed(uniforms: Array, dummy: Array) -> Array:
-    """Return the (n, d) uniforms moved by the (n,) dummy, reflected at the borders of the cube."""
+    """Return the (n, d) uniforms perturbed by the (n,) dummy, reflected at the borders."""
     turns = dummy[:, None] + _TURN * np.arange(uniforms.shape[1])
     moved = np.abs(uniforms + PERTURBATION * np.sin(2.0 * np.pi * turns))
     return np.asarray(1.0 - np.abs(1.0 - moved))

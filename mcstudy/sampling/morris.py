@@ -1,8 +1,8 @@
 """Morris's trajectories: designs that change one factor after the other, by SALib.
 
-With one size of step an output that repeats itself after just this step, as one of a periodic input
-may, has no effect at all. The grid of each trajectory is therefore shrunk by a random factor, and
-that of each input shifted: steps have any size from half of Morris's to all of it.
+With a single step size an output that is periodic in an input with just this step shows no effect.
+The grid of each trajectory is therefore shrunk by a random factor, and that of each input shifted:
+steps have any size from half of Morris's to all of it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,20 +19,21 @@ Array = NDArray[np.float64]
 TAIL = 0.025
 """Levels lie between this and one minus this in an input's probability (assumed)."""
 SMALLEST_GRID = 0.5
-"""Share of its range that a trajectory's grid has at least (assumed)."""
+"""Smallest extent of a trajectory's grid, as a share of the range (assumed)."""
 
 
 @dataclass(frozen=True)
 class Trajectories:
-    """A design in the unit cube.
+    """A Morris design in the unit cube.
 
     Attributes
     ----------
-    uniforms : (n * block, d) of the inputs, the dummy's nudge applied.
-    levels : (n * block, d + 1) places of the inputs and the dummy, 0 to 1: levels of the grid of
-        their trajectory.
-    factors : names of what is changed, inputs or groups, the dummy last.
-    block : rows of one trajectory. trajectory : (n * block,) of each row.
+    uniforms : (n * block, d) of the inputs, perturbed by the dummy.
+    levels : (n * block, d + 1) places of the inputs and the dummy, 0 to 1, on the grid of their
+        trajectory.
+    factors : names of the factors, inputs or groups, the dummy last.
+    block : number of rows of one trajectory.
+    trajectory : (n * block,) trajectory of each row.
     """
 
     uniforms: Array
@@ -53,9 +54,15 @@ def draw_trajectories(
 
     Parameters
     ----------
-    inputs : d names. groups : names of inputs by group.
-    n : trajectories; each has its own random stream, so a larger design begins with a smaller one.
-    levels : of the grid, even. seed : int
+    inputs : sequence of str
+        Names of the d inputs.
+    groups : mapping
+        Names of inputs by group.
+    n : int
+        Trajectories; each has its own random stream, so a larger design begins with a smaller one.
+    levels : int
+        Of the grid, even.
+    seed : int
     """
     from SALib.sample import morris
 
@@ -73,6 +80,6 @@ def draw_trajectories(
 
 
 def _shifted(rows: Array, stream: np.random.Generator) -> Array:
-    """Return a trajectory on a grid that is smaller, and elsewhere for each input."""
+    """Return a trajectory on a grid that is shrunk, and shifted for each input."""
     size = stream.uniform(SMALLEST_GRID, 1.0)
     return stream.uniform(0.0, 1.0 - size, rows.shape[1]) + size * rows

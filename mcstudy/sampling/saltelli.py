@@ -2,7 +2,7 @@
 
 A design is sixteen independent scrambles of one low-discrepancy sequence, taken in turn. Points of
 one scramble are not independent, and resampling them gives intervals that are too wide, three to
-ten times for smooth functions from 1,024 points on; the scrambles are, and their spread is honest.
+ten times for smooth functions from 1,024 points on; the scrambles are, and give unbiased intervals.
 """
 
 import warnings
@@ -23,14 +23,14 @@ SCRAMBLES = 16
 
 @dataclass(frozen=True)
 class Saltelli:
-    """A design in the unit cube.
+    """A Saltelli design in the unit cube.
 
     Attributes
     ----------
-    uniforms : (n * block, d) of the inputs, the dummy's nudge applied.
-    factors : names of what is exchanged, inputs or groups, the dummy last.
-    block : rows of one base point.
-    scramble : (n * block,) of each row; base point i belongs to scramble ``i % 16``.
+    uniforms : (n * block, d) of the inputs, perturbed by the dummy.
+    factors : names of the factors, inputs or groups, the dummy last.
+    block : number of rows of one base point.
+    scramble : (n * block,) scramble of each row; base point i belongs to scramble ``i % 16``.
     """
 
     uniforms: Array
@@ -45,11 +45,14 @@ def block_size(factors: Sequence[str], *, second_order: bool) -> int:
 
 
 def is_base_row(run: NDArray[np.int64], block: int) -> NDArray[np.bool_]:
-    """Tell which runs are rows of A or B: of a block only these are drawn independently.
+    """Return which runs are rows of A or B, the only independently drawn ones of a block.
 
     Parameters
     ----------
-    run : (n,) ids in the order of the design. block : rows of one base point.
+    run : (n,) array of int
+        Ids in the order of the design.
+    block : int
+        Rows of one base point.
     """
     return np.isin(run % block, (0, block - 1))
 
@@ -66,9 +69,16 @@ def draw_saltelli(
 
     Parameters
     ----------
-    inputs : d names. groups : names of inputs by group.
-    n : base points, 16 times a power of two; the design for n is the first half of that for 2 n.
-    seed : of the scrambles. second_order : whether to add the rows that second order takes.
+    inputs : sequence of str
+        Names of the d inputs.
+    groups : mapping
+        Names of inputs by group.
+    n : int
+        Base points, 16 times a power of two; the design for n is the first half of that for 2 n.
+    seed : int
+        Of the scrambles.
+    second_order : bool
+        Whether to add the rows that second-order indices need.
     """
     from SALib.sample import sobol
 
@@ -77,7 +87,7 @@ def draw_saltelli(
     problem = salib_problem(inputs, groups)
     cube = np.empty((n // SCRAMBLES, SCRAMBLES, block, len(inputs) + 1))
     with warnings.catch_warnings():
-        # The design starts where the sequence starts; it is scrambled.
+        # The scrambled sequence is used from its first point.
         warnings.simplefilter("ignore")
         for k in range(SCRAMBLES):
             stream = seeds.generator(seed, seeds.SALTELLI, k)

@@ -15,5 +15,15 @@ AGREEMENT = 6
 
 
 def generator(seed: int, stream: int, index: int = 0) -> np.random.Generator:
-    """Return the generator of item ``index`` of a named stream."""
+    """Return the generator of one item of a named stream.
+
+    Parameters
+    ----------
+    seed : int
+        Of the study.
+    stream : int
+        One of the constants above.
+    index : int
+        Of the item within the stream.
+    """
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(stream, index)))

@@ -1,6 +1,6 @@
-"""Runs of a design that comes in blocks: base points of Saltelli's, trajectories of Morris's.
+"""Runs of block designs: base points of Saltelli's design, trajectories of Morris's.
 
-A block is whole or it is lost: an index is a mean over differences within blocks, and dropping
+A block is used whole or not at all: an index is a mean over differences within blocks, and dropping
 single rows would pair runs that do not belong together.
 """
 
@@ -19,17 +19,21 @@ MIN_BLOCKS = 8
 
 
 def whole_blocks(outputs: Array, complete: Flags, block: int) -> tuple[Array, Flags]:
-    """Return outputs by block, and which blocks each output may use.
+    """Return outputs by block, and the usable blocks of each output.
 
     Parameters
     ----------
-    outputs : (n * block, m). complete : (n * block,) runs that did not fail.
-    block : rows of a block.
+    outputs : (n * block, m) array
+    complete : (n * block,) array of bool
+        Runs that did not fail.
+    block : int
+        Rows of a block.
 
     Returns
     -------
-    cube : (n, block, m)
-    kept : (n, m), true where the block has no failed run and a finite value in every row.
+    cube : (n, block, m) array
+    kept : (n, m) array of bool
+        True where the block has no failed run and a finite value in every row.
     """
     cube = outputs.reshape(-1, block, outputs.shape[1])
     whole = np.asarray(complete.reshape(-1, block).all(axis=1))
@@ -37,11 +41,11 @@ def whole_blocks(outputs: Array, complete: Flags, block: int) -> tuple[Array, Fl
 
 
 def is_enough(kept: Flags) -> bool:
-    """Tell whether so many of an output's (n,) blocks are kept that it gets an index."""
+    """Return whether enough of an output's (n,) blocks are kept for an index."""
     return int(kept.sum()) >= max(MIN_BLOCKS, (1.0 - MAX_DROPPED) * kept.size)
 
 
 def outputs_alike(kept: Flags) -> Iterator[tuple[Flags, NDArray[np.intp]]]:
-    """Yield (n,) blocks and the outputs that use exactly them, so that they share one estimate."""
+    """Yield each pattern of kept blocks (n,) with the outputs that share it."""
     for pattern in np.unique(kept, axis=1).T:
         yield pattern, np.flatnonzero((kept == pattern[:, None]).all(axis=0))

@@ -1,17 +1,17 @@
-"""Borgonovo's delta: the share of an output's density that moves when an input is known.
+"""Borgonovo's delta: the shift of an output's density when an input is fixed.
 
 E. Borgonovo, Reliability Engineering and System Safety 92, 2007: half the expected area between the
 density of the output and its density at a given input; 0 for an input without influence, 1 for one
 that fixes the output. The estimator cuts the sample into classes of equal counts along the input,
-estimates the densities by Gaussian kernels and takes the bias off by bootstrap (E. Plischke,
+estimates the densities by Gaussian kernels and corrects the bias by bootstrap (E. Plischke,
 E. Borgonovo, C. Smith, European Journal of Operational Research 226, 2013, equations 26 and 30).
 
-Delta does not change under a rising transformation of the output, so densities are estimated on its
+Delta is invariant under increasing transformations of the output, so densities are estimated on its
 normal scores, where a skewed output is as well resolved as any other.
 
-SALib 1.6 takes equation 30 from a resample instead of the sample, which leaves twice the bias
-(a dummy gets 0.07 at 2,000 runs), so the estimator is our own; its equation 26 is held against
-SALib's on equal samples.
+SALib 1.6 applies equation 30 to a resample instead of the sample, which leaves twice the bias
+(a dummy gets 0.07 at 2,000 runs), so the estimator is implemented here; its equation 26 is tested
+against SALib's on equal samples.
 """
 
 from itertools import pairwise
@@ -23,21 +23,25 @@ from scipy import special, stats
 Array = NDArray[np.float64]
 
 RESAMPLES = 30
-"""Bootstrap resamples of bias and scatter (assumed)."""
+"""Bootstrap resamples for bias and standard deviation (assumed)."""
 GRID = 100
 """Points at which densities are compared (Plischke et al.)."""
 MAX_CLASSES = 48
 
 
 def delta(values: Array, outputs: Array, rng: np.random.Generator) -> Array:
-    """Return delta of each input with its bootstrap scatter of two standard deviations, (3, d).
+    """Return delta of each input with two bootstrap standard deviations either side, (3, d).
 
-    The scatter is no confidence interval: what bias is left, upward for inputs without influence
-    and downward for others, is as large.
+    This is no confidence interval: the remaining bias, upward for inputs without influence and
+    downward for others, is as large.
 
     Parameters
     ----------
-    values : (n, d). outputs : (n,), finite. rng : of the resamples.
+    values : (n, d) array
+    outputs : (n,) array
+        Finite.
+    rng : Generator
+        Of the resamples.
     """
     n = outputs.size
     if np.ptp(outputs) == 0.0:
@@ -59,7 +63,7 @@ def density_shift(values: Array, outputs: Array) -> Array:
     n = outputs.size
     shift = np.zeros(values.shape[1])
     if np.ptp(outputs) == 0.0:
-        # A resample may hold one value alone, of which nothing can move.
+        # A resample may hold one value only: its distribution cannot shift.
         return shift
     grid = np.linspace(outputs.min(), outputs.max(), GRID)
     overall = _density(outputs, grid)
@@ -72,7 +76,7 @@ def density_shift(values: Array, outputs: Array) -> Array:
                 gap = np.abs(overall - _density(part, grid))
                 moved = 0.5 * float(np.trapezoid(gap, grid))
             else:
-                # One value alone has no density: all moves that does not have this value anyway.
+                # A single value has no density: the shift is the probability of all other values.
                 moved = 1.0 - float(np.mean(outputs == part[0]))
             shift[column] += part.size / n * moved
     return shift

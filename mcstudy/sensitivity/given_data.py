@@ -1,8 +1,8 @@
-"""Sensitivity from any sample of inputs and outputs, whatever its design.
+"""Given-data sensitivity: measures from any sample of inputs and outputs, whatever its design.
 
-All measures hold for dependent inputs, as measures of association: an input that only goes with
-another one gets that one's share as well. Dummies, independent of everything, draw the noise line
-of each measure.
+For dependent inputs the measures are measures of association: an input that is only correlated with
+an influential one shares its value. Dummies, independent of everything, give the noise line of each
+measure.
 """
 
 from collections.abc import Callable
@@ -20,9 +20,9 @@ from mcstudy.statistics import varies
 Array = NDArray[np.float64]
 
 MIN_RUNS = 100
-"""Runs with a value below which the measures say nothing (assumed)."""
+"""Smallest number of runs with a value for the measures to be estimated (assumed)."""
 DUMMIES = 20
-"""Dummies whose largest value draws the noise line: one input in twenty passes it by chance."""
+"""Dummies whose largest value is the noise line: one input in twenty passes it by chance."""
 
 MEASURES: dict[str, Callable[[Array, Array, np.random.Generator], Array]] = {
     "first_order": rank_first_order,
@@ -34,13 +34,13 @@ MEASURES: dict[str, Callable[[Array, Array, np.random.Generator], Array]] = {
 
 @dataclass(frozen=True)
 class GivenData:
-    """What the measures say of one output; NaN where it does not vary.
+    """Given-data measures of one output; NaN where it does not vary.
 
     Attributes
     ----------
     values : by measure, (3, d) value, low and high of each input.
     noise : by measure, the largest value among the dummies.
-    runs : with a value of the output.
+    runs : number of runs with a value of the output.
     """
 
     values: dict[str, Array]
@@ -53,8 +53,12 @@ def measure_given_data(values: Array, outputs: Array, seed: int) -> GivenData:
 
     Parameters
     ----------
-    values : (n, d), finite. outputs : (n,), NaN where there is none.
-    seed : of dummies and resamples.
+    values : (n, d) array
+        Finite.
+    outputs : (n,) array
+        NaN where undefined.
+    seed : int
+        Of dummies and resamples.
 
     Raises
     ------

@@ -17,7 +17,10 @@ def main_effect(values: Array, outputs: Array) -> dict[str, Any]:
 
     Parameters
     ----------
-    values : (n,) of an input. outputs : (n,), NaN where there is none.
+    values : (n,) array
+        Of the input.
+    outputs : (n,) array
+        NaN where undefined.
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """Morris screening: elementary effects along random trajectories.
 
-Every trajectory changes one factor after the other by one large step. The mean size of an output's
-changes (mu*) ranks the factors at the cost of a few dozen runs each, their scatter (sigma) shows
-interactions and curvature (M. Morris, Technometrics 33, 1991; F. Campolongo, J. Cariboni,
+Every trajectory changes one factor after the other by one large step. The mean absolute elementary
+effect (mu*) ranks the factors at the cost of a few dozen runs each; the standard deviation (sigma)
+shows interactions and curvature (M. Morris, Technometrics 33, 1991; F. Campolongo, J. Cariboni,
 A. Saltelli, Environmental Modelling and Software 22, 2007).
 """
 
@@ -25,8 +25,10 @@ class ElementaryEffects:
 
     Attributes
     ----------
-    mean : (d,), NaN for a group. mu_star : (3, d) mu* with low and high.
-    sigma : (d,) sigma, NaN for a group. trajectories : used.
+    mean : (d,) mu, NaN for a group.
+    mu_star : (3, d) mu* with low and high.
+    sigma : (d,) sigma, NaN for a group.
+    trajectories : number of trajectories used.
     """
 
     mean: Array
@@ -49,9 +51,20 @@ def estimate_effects(
 
     Parameters
     ----------
-    inputs, groups, levels : as drawn.
-    rows : (n * block, d + 1) places of the trajectories. outputs : (n * block,), all finite.
-    resamples, seed : of the bootstrap over trajectories that gives the 95 % intervals of mu*.
+    inputs : sequence of str
+        Names of the inputs, as drawn.
+    groups : mapping
+        Names of inputs by group, as drawn.
+    rows : (n * block, d + 1) array
+        Places of the trajectories.
+    outputs : (n * block,) array
+        All finite.
+    levels : int
+        Levels of the grid, as drawn.
+    resamples : int
+        Of the bootstrap over trajectories that gives the 95 % intervals of mu*.
+    seed : int
+        Of the bootstrap.
 
     Raises
     ------
@@ -66,7 +79,7 @@ def estimate_effects(
     if count < 2:
         raise ValueError("elementary effects take two trajectories or more")
     scale = scale_of(outputs)
-    # Effects of an output that does not vary beyond rounding are zero, not rounding.
+    # Effects of an output that varies by rounding alone are set to zero.
     scaled = outputs / scale if varies(outputs) else np.zeros_like(outputs)
     # SALib divides by Morris's step; each trajectory has its own.
     paths = rows.reshape(count, -1, rows.shape[1])
@@ -84,6 +97,6 @@ def estimate_effects(
     size, reach, spread = (
         scale * np.asarray(found[key], dtype=float) for key in ("mu_star", "mu_star_conf", "sigma")
     )
-    # The members of a group move up or down on their own: their mean has no sign.
+    # Members of a group move up or down independently: the mean effect has no sign.
     mean = np.where(np.isnan(spread), np.nan, scale * np.asarray(found["mu"], dtype=float))
     return ElementaryEffects(mean, np.stack([size, size - reach, size + reach]), spread, count)

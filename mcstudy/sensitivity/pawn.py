@@ -1,4 +1,4 @@
-"""PAWN: how far an output's distribution moves when an input is held (by SALib).
+"""PAWN: the shift of an output's distribution when an input is fixed (by SALib).
 
 F. Pianosi, T. Wagener, Environmental Modelling and Software 67, 2015, and 108, 2018: the sample is
 cut into slices of equal counts along an input; the index is the median over the slices of the
@@ -18,7 +18,11 @@ def pawn(values: Array, outputs: Array, rng: np.random.Generator) -> Array:
 
     Parameters
     ----------
-    values : (n, d). outputs : (n,), finite. rng : not used, the measure has no chance in it.
+    values : (n, d) array
+    outputs : (n,) array
+        Finite.
+    rng : Generator
+        Not used: the measure is deterministic.
     """
     from SALib.analyze import pawn as salib_pawn
 

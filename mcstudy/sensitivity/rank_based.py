@@ -1,6 +1,6 @@
 """Rank-based first-order index from any sample.
 
-Sort the runs by an input: what the outputs of neighbours share is what that input explains
+With runs sorted by an input, the covariance of neighbouring outputs is the variance it explains
 (F. Gamboa, P. Gremaud, T. Klein, A. Lagnoux, Bernoulli 28, 2022; S. Chatterjee's coefficient).
 """
 
@@ -12,7 +12,7 @@ from mcstudy.statistics import REACH, scale_of
 Array = NDArray[np.float64]
 
 PARTS, PARTITIONS = 5, 20
-"""Disjoint parts of the sample whose scatter gives the interval, and how often they are drawn anew
+"""Disjoint parts of the sample whose variance gives the interval, and number of random partitions
 (assumed)."""
 
 
@@ -21,9 +21,13 @@ def rank_first_order(values: Array, outputs: Array, rng: np.random.Generator) ->
 
     Parameters
     ----------
-    values : (n, d). outputs : (n,), finite. rng : of the parts.
+    values : (n, d) array
+    outputs : (n,) array
+        Finite.
+    rng : Generator
+        Of the partitions.
     """
-    # Squares of scaled outputs neither overflow nor vanish; an index does not feel the scale.
+    # Squares of scaled outputs neither overflow nor vanish; the index is scale-invariant.
     outputs = outputs / scale_of(outputs)
     found = _estimate(values, outputs)
     variances = []

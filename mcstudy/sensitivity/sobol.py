@@ -10,8 +10,8 @@ Computer Physics Communications 145, 2002; Saltelli et al., Computer Physics Com
     S_ij = mean(f_BAi f_ABj - f_A f_B) / V - S_i - S_j second order (Saltelli 2002)
 
 Every estimator is a ratio of means over base points, so all bootstrap resamples of all inputs and
-outputs are one matrix product of resampling weights with the terms of the base points. What is
-resampled is whatever is independent: base points, or the replicates that they belong to.
+outputs are one matrix product of resampling weights with the terms of the base points. The
+independent units are resampled: base points, or the replicates that they belong to.
 """
 
 from collections.abc import Sequence
@@ -57,9 +57,11 @@ class Indices:
 
     Attributes
     ----------
-    first, total : (3, d, m) value, low, high. first_sum : (3, m) of all first-order indices.
-    second : (3, d, d, m) upper triangle, NaN elsewhere; None if the design has no such blocks.
-    variance : (m,). blocks : base points used.
+    first, total : (3, d, m) value, low, high.
+    first_sum : (3, m) sum of all first-order indices.
+    second : (3, d, d, m) upper triangle, NaN elsewhere; None without second-order rows.
+    variance : (m,) of the outputs.
+    blocks : number of base points used.
     """
 
     first: Array
@@ -75,8 +77,12 @@ def split_blocks(outputs: Array, d: int, *, second_order: bool) -> Blocks:
 
     Parameters
     ----------
-    outputs : (n (d + 2), m), or (n (2 d + 2), m) with second order.
-    d : inputs or groups that are exchanged.
+    outputs : array
+        Shape (n (d + 2), m), or (n (2 d + 2), m) with second order.
+    d : int
+        Number of inputs or groups that are exchanged.
+    second_order : bool
+        Whether the design has the rows of second-order indices.
 
     Raises
     ------
@@ -103,15 +109,20 @@ def estimate_indices(
     rng: np.random.Generator | None = None,
     centre: Literal["all", "base"] = "all",
 ) -> Indices:
-    """Return the indices of all inputs and outputs.
+    """Return the Sobol' indices of all inputs and outputs.
 
     Parameters
     ----------
-    blocks : Blocks, all finite.
-    replicate : (n,) of each base point, resampled as a whole; by default each is one of its own.
-    resamples : for the intervals; 0 leaves them NaN.
-    rng : of the resamples, by default a fixed one.
-    centre : where outputs are centred: at the mean of all rows (as SALib) or of A and B (as SciPy).
+    blocks : Blocks
+        All finite.
+    replicate : (n,) array of int, optional
+        Replicate of each base point, resampled as a whole; by default each base point is its own.
+    resamples : int
+        Bootstrap resamples for the intervals; 0 leaves them NaN.
+    rng : Generator, optional
+        Of the resamples, by default with a fixed seed.
+    centre : {"all", "base"}
+        Outputs are centred at the mean of all rows (as SALib) or of A and B (as SciPy).
 
     Raises
     ------
@@ -121,10 +132,10 @@ def estimate_indices(
     Notes
     -----
     An output that does not vary beyond rounding has indices of NaN and a variance of zero; no other
-    has, however small its numbers are. One that varies, but not over A and B, has indices and a
-    variance of NaN. Intervals are those of Student's t with the
-    bootstrap's standard deviation, which is too small by sqrt((R - 1) / R) for R replicates
-    (B. Efron, R. Tibshirani, An Introduction to the Bootstrap, 1993, section 5.3).
+    output has, whatever its scale. One that varies, but not over A and B, has indices and a
+    variance of NaN. Intervals are those of Student's t with the bootstrap's standard deviation,
+    which is too small by sqrt((R - 1) / R) for R replicates (B. Efron, R. Tibshirani, An
+    Introduction to the Bootstrap, 1993, section 5.3).
     """
     arrays = [blocks.A, blocks.B, blocks.AB] + ([] if blocks.BA is None else [blocks.BA])
     if not all(np.all(np.isfinite(a)) for a in arrays):
@@ -160,7 +171,7 @@ def estimate_indices(
 def _scaled(blocks: Blocks) -> tuple[Blocks, Array, NDArray[np.bool_]]:
     """Return the blocks over the scale of each output, the scales, and which outputs vary.
 
-    Squares of scaled values neither overflow nor vanish, and indices do not feel a scale. An output
+    Squares of scaled values neither overflow nor vanish, and indices are scale-invariant. An output
     that does not vary beyond rounding becomes zero.
     """
     together = {"A": blocks.A, "B": blocks.B, "AB": blocks.AB}
@@ -175,10 +186,10 @@ def _scaled(blocks: Blocks) -> tuple[Blocks, Array, NDArray[np.bool_]]:
 
 
 def _unscaled(variance: Array, scales: Array, held: NDArray[np.bool_]) -> Array:
-    """Return the variances of outputs, of which some vary, from those of the scaled ones."""
+    """Return the variances of the outputs from those of the scaled outputs."""
     with np.errstate(over="ignore", under="ignore"):
         found = variance * scales * scales
-    # One that is too small for a number is not the zero of an output that does not vary.
+    # An underflowing variance must differ from the zero of a constant output.
     found = np.maximum(found, np.finfo(float).smallest_subnormal)
     return np.where(held, np.where(variance > 0.0, found, np.nan), 0.0)
 
@@ -203,7 +214,7 @@ def _terms(blocks: Blocks, mean: Array, pairs: Sequence[tuple[int, int]]) -> Arr
 def _resampled(
     table: Array, replicate: NDArray[np.int64], resamples: int, rng: np.random.Generator
 ) -> tuple[Array, float]:
-    """Return the terms' means over resampled replicates, and the reach of an interval in their sd.
+    """Return the terms' means over resampled replicates, and the interval's half-width in sd.
 
     Without resamples, or with one replicate, there are no means.
     """

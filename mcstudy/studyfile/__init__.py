@@ -1,1 +1,1 @@
-"""Study files: what a user writes, checked."""
+"""Study files: schema, checks, input space."""

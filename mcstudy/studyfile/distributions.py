@@ -1,8 +1,8 @@
 """Distributions of inputs.
 
-Every distribution is a table of a study file and knows one thing: its quantile function. A design
-gives independent uniforms; a Gaussian copula makes them dependent; the quantiles turn them into
-values in the file's unit, converted to the model's unit by the caller.
+Every distribution is a table of a study file with a quantile function. A design gives independent
+uniforms; a Gaussian copula makes them dependent; quantile functions map them to values in the
+file's unit, which the caller converts to the model's unit.
 """
 
 from abc import abstractmethod
@@ -27,13 +27,13 @@ Array = NDArray[np.float64]
 
 
 SMALLEST_SHARE = 1e-20
-"""Probability below which a truncation that leaves no more counts as a mistake (assumed)."""
+"""Smallest probability that a truncation may leave (assumed)."""
 
 _ABSURD = np.errstate(all="ignore")
-"""Of parameters beyond what numbers can hold come infinity and NaN, outside every model's range."""
+"""Overflowing parameters give infinity or NaN, which lie outside every model's range."""
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 Unit = Annotated[str, AfterValidator(units.canonical)]
-"""A unit, whatever its spelling; one that no quantity has is refused where it is used."""
+"""A unit in any spelling; an unknown one is refused where it is used."""
 
 
 class _Table(BaseModel):
@@ -91,7 +91,7 @@ class Triangular(_Distribution):
 
 
 class _Truncated(_Distribution):
-    """A distribution by its normal score: ``value(z)`` with z standard normal, rising."""
+    """A distribution by its normal score: ``value(z)``, increasing, with z standard normal."""
 
     low: FiniteFloat | None = None
     high: FiniteFloat | None = None
@@ -114,7 +114,7 @@ class _Truncated(_Distribution):
         return np.asarray(np.where(upper, -score, score))
 
     def _bounded(self, values: Array) -> Array:
-        """Return values with the last bits of rounding beyond the bounds taken off."""
+        """Return values clipped to the bounds, beyond which rounding may lie."""
         return np.asarray(np.clip(values, self.low, self.high))
 
 

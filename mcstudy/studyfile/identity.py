@@ -1,4 +1,4 @@
-"""What makes two studies the same: everything that changes the numbers of a run."""
+"""Identity of a study: everything that changes the numbers of a run."""
 
 import hashlib
 import json
@@ -8,7 +8,7 @@ from mcstudy.studyfile.schema import SampledStudy
 
 
 def numbers_digest(study: SampledStudy, model: Simulator) -> dict[str, str]:
-    """Return, by topic, what changes the numbers of a study, as canonical JSON.
+    """Return the settings that change the numbers of a study, by topic, as canonical JSON.
 
     Two studies whose digests are equal give the same row for the same run id; n is left out
     because a larger design begins with the smaller one.

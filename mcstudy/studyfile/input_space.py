@@ -1,8 +1,8 @@
-"""The input space: names, units, distributions and dependence of what is not known.
+"""The input space: names, units, distributions and dependence of the uncertain inputs.
 
-A point of the unit cube, or of standard normal scores, is one set of values. Designs, priors and
-posteriors stand on this; it knows nothing of study files. A Gaussian copula makes independent
-uniforms dependent, quantiles turn them into values.
+A point of the unit cube, or a vector of standard normal scores, maps to one set of values. Designs,
+priors and posteriors use this module; it is independent of study files. A Gaussian copula makes
+independent uniforms dependent, quantile functions map them to values.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,7 @@ from mcstudy import units as unit_conversion
 Array = NDArray[np.float64]
 
 MAX_SCORE = 8.0
-"""Normal score beyond which a quantile is not followed."""
+"""Largest normal score, in size; quantiles are clipped there."""
 
 
 class Marginal(Protocol):
@@ -91,7 +91,7 @@ class InputSpace:
         ValueError
             Naming the input whose values cannot be drawn.
         """
-        # Where nothing is correlated the uniforms stay to the last bit.
+        # Uncorrelated inputs keep their uniforms bit for bit.
         columns = [uniforms[:, k] for k in range(uniforms.shape[1])]
         if self._tied.any():
             scores = special.ndtri(np.clip(uniforms, 1e-15, 1.0 - 1e-15))
@@ -106,7 +106,7 @@ class InputSpace:
         Parameters
         ----------
         scores : (n, d) array
-            Columns in the order of ``names``; beyond +-8 they are held.
+            Columns in the order of ``names``; clipped at +-8.
         """
         held = np.clip(scores, -MAX_SCORE, MAX_SCORE)
         if self._tied.any():

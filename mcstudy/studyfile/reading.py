@@ -11,10 +11,10 @@ from mcstudy.files import parse_toml
 Study = TypeVar("Study")
 
 LONGEST = 200
-"""Characters of a message, above which it is cut."""
+"""Largest number of characters of a message."""
 _MIXED = {"options": "a text, a number or a list of pairs of numbers",
           "fixed": "a number or a list of pairs of numbers"}  # fmt: skip
-"""What the tables hold whose values may be of several types."""
+"""Contents of the tables whose values may be of several types."""
 
 
 def check_study(text: str, source: str, kinds: TypeAdapter[Study]) -> Study:
@@ -46,7 +46,10 @@ def first_problem(error: ValidationError, table: Mapping[str, Any]) -> str:
 
     Parameters
     ----------
-    error : of the check. table : as it was read.
+    error : ValidationError
+        Of the check.
+    table : mapping
+        The table as read from the file.
     """
     problem = error.errors(include_url=False)[0]
     kind = problem["type"]
@@ -71,10 +74,10 @@ def first_problem(error: ValidationError, table: Mapping[str, Any]) -> str:
 def _place_in(
     table: Any, location: tuple[int | str, ...], *, missing: bool
 ) -> tuple[list[str], int]:
-    """Return the parts of a location that the file has, and after how many another stood last.
+    """Return the parts of a location that the file has, and where the last other part was.
 
-    Pydantic puts the chosen kind of study and of distribution into a location, and the type that
-    it tried; the file does not have them. What is missing is the last part.
+    Pydantic adds the chosen kind of study and of distribution to a location, and the type that it
+    tried; the file does not have them. A missing key is the last part.
     """
     parts: list[str] = []
     other = 0

@@ -1,4 +1,4 @@
-"""What study files of several kinds may hold: one class a table."""
+"""Tables that study files of several kinds share: one class a table."""
 
 import re
 from typing import Annotated, Any, Literal
@@ -18,7 +18,7 @@ from mcstudy.sampling.factors import DUMMY
 from mcstudy.studyfile.distributions import Distribution, Unit
 
 LARGEST_DESIGN = 10_000_000
-"""Runs that one study may have; their table fits a machine's memory."""
+"""Largest number of runs of a study; their table fits in memory."""
 LARGEST_SEED = 2**63 - 1
 RUN_TIME = 600.0
 """s that one run may take by default before its process is ended."""
@@ -33,7 +33,7 @@ class StudyTable(BaseModel):
 
 
 def check_folder_name(name: str, place: str = "") -> None:
-    """Raise ``ValueError`` if a name, which stands at a place of the file, can name no folder."""
+    """Raise ``ValueError`` if a name, given at a place of the file, cannot name a folder."""
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,79}", name) or ".." in name:
         raise ValueError(
             f"{place}name {name!r} must be letters, digits, '_', '-' or '.', as it names a folder"
@@ -55,7 +55,7 @@ class Value(StudyTable):
 
 
 class Reference(StudyTable):
-    """A known value of an output, drawn and judged beside the predictions."""
+    """A reference value of an output, drawn and assessed beside the predictions."""
 
     output: str
     value: FiniteFloat
@@ -108,7 +108,7 @@ class Report(StudyTable):
 
 
 class AnyStudy(StudyTable):
-    """What every kind of study has; each has a ``kind`` that names it."""
+    """Keys of every kind of study; ``kind`` names it."""
 
     format: Literal["mcstudy-study/1"]
     kind: str
@@ -124,14 +124,14 @@ class AnyStudy(StudyTable):
 
 
 class CommonStudy(AnyStudy):
-    """What every kind of study of one model has."""
+    """Keys of every kind of study of one model."""
 
     model: ModelChoice
     effects: dict[str, dict[str, FiniteFloat]] = {}
 
 
 class Limits(StudyTable):
-    """How much may go wrong: the share of runs that may fail, and s that one run may take."""
+    """Limits: the largest share of failed runs, and the longest time of one run (s)."""
 
     max_failure_rate: Annotated[float, Field(ge=0.0, le=1.0)] = 0.02
     run_time: Annotated[FiniteFloat, Field(ge=0.01, le=1e6)] = RUN_TIME
@@ -142,7 +142,7 @@ STRIP_TIMES = [0.0, 0.02, 0.04, 0.06, 0.08]
 
 
 class ComparisonRow(StudyTable):
-    """A row of a table to print beside our run."""
+    """A row of a table to print beside the simulated run."""
 
     label: str
     values: dict[str, FiniteFloat]
@@ -158,23 +158,23 @@ class ComparisonTable(StudyTable):
 
 
 class SampledStudy(CommonStudy, Limits):
-    """What kinds of study have that sample the inputs of one model into one table of runs."""
+    """Keys of studies that sample the inputs of one model into one table of runs."""
 
     inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
     dependence: Dependence = Dependence()
 
     @property
     def reported(self) -> list[str] | None:
-        """Outputs that the study names for its report, if it names any."""
+        """Outputs that the study names for its report; None if it names none."""
         raise NotImplementedError
 
     def design_topics(self) -> dict[str, Any]:
-        """Return what of the design changes the numbers of a run, by topic."""
+        """Return the design settings that change the numbers of a run, by topic."""
         raise NotImplementedError
 
 
 class FactorStudy(SampledStudy):
-    """What kinds of study have that exchange one factor, an input or a group, after the other."""
+    """Keys of studies that exchange one factor, an input or a group, after the other."""
 
     groups: dict[str, Annotated[list[str], Field(min_length=1)]] = {}
 
@@ -182,9 +182,7 @@ class FactorStudy(SampledStudy):
     def _grouped_once(self) -> "FactorStudy":
         for table, taken in (("inputs", [*self.inputs]), ("groups", [*self.groups])):
             if DUMMY in taken:
-                raise ValueError(
-                    f"{table}.{DUMMY}: this name is the factor's that stands for no input"
-                )
+                raise ValueError(f"{table}.{DUMMY}: this name is reserved for the dummy factor")
         seen: dict[str, str] = {}
         for group, names in self.groups.items():
             if group in self.inputs:
@@ -198,7 +196,7 @@ class FactorStudy(SampledStudy):
         return self
 
     def design_topics(self) -> dict[str, Any]:
-        """Return what of the design changes the numbers of a run, by topic."""
+        """Return the design settings that change the numbers of a run, by topic."""
         return {
             "kind": self.kind,
             "groups": {group: sorted(names) for group, names in self.groups.items()},
@@ -206,7 +204,7 @@ class FactorStudy(SampledStudy):
 
 
 class FactorReport(StudyTable):
-    """``[report]`` of such a study: outputs to rank, resamples of the intervals."""
+    """``[report]`` of a factor study: outputs to rank, resamples of the intervals."""
 
     outputs: Annotated[list[str], Field(min_length=1)] | None = None
     resamples: Annotated[int, Field(ge=100, le=100_000)] = 1000

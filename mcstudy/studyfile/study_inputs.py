@@ -118,7 +118,7 @@ def check_independent(study: FactorStudy) -> None:
     """Raise ``UserError`` if inputs of different factors depend on each other."""
     member = {name: group for group, names in study.groups.items() for name in names}
     for first, second in dependent_pairs(study):
-        # What is not sampled at all is refused with the dependence itself.
+        # An input that is not sampled is refused when the dependence is checked.
         if first not in study.inputs or second not in study.inputs:
             continue
         if member.get(first, first) != member.get(second, second):

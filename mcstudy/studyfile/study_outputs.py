@@ -25,7 +25,21 @@ def report_outputs(study: SampledStudy, model: Simulator) -> list[str]:
 
 
 def check_outputs(names: Sequence[str], model: Simulator, place: str) -> None:
-    """Raise ``UserError`` if the model lacks one of the outputs, or one is named twice."""
+    """Check that the model has each of the outputs and that none is named twice.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Outputs.
+    model : Simulator
+    place : str
+        Key of the study file, for messages.
+
+    Raises
+    ------
+    UserError
+        If an output is missing or named twice.
+    """
     known = [item.name for item in model.outputs]
     for name in names:
         if names.count(name) > 1:

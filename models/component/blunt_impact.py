@@ -1,8 +1,8 @@
 """A flat rigid impactor against one region of the free, upright body, from any side.
 
 Thorax and abdomen impacts of child donors (Ouyang 2006, 2015) and of dummies (49 CFR 572.124),
-lateral and oblique hub impacts of adults (Viano 1989), frontal ones (Lebarbe 2012). Weight is left
-out: the impact is over before the body has begun to fall. Arms are out of the impactor's way.
+lateral and oblique hub impacts of adults (Viano 1989), frontal ones (Lebarbe 2012). Gravity is
+neglected: the impact is over before the body has begun to fall. The arms do not touch the impactor.
 """
 
 import math
@@ -42,7 +42,12 @@ class BluntImpact:
 
     Attributes
     ----------
-    time : (n,) s. force : (n,) N. deflection : (n,) m, penetration of the face into the region.
+    time : (n,) array
+        s.
+    force : (n,) array
+        N.
+    deflection : (n,) array
+        Penetration of the impactor's face into the region, m.
     """
 
     time: Array
@@ -51,7 +56,7 @@ class BluntImpact:
 
     @property
     def hysteresis(self) -> float:
-        """Share of the work of loading that unloading does not give back."""
+        """Share of the loading work that unloading does not return."""
         power = np.diff(self.deflection) * 0.5 * (self.force[1:] + self.force[:-1])
         loading = float(power[power > 0.0].sum())
         return float(power.sum()) / loading if loading > 0.0 else math.nan
@@ -62,7 +67,7 @@ def _strike(
     tree, joints, ellipsoids, motion, loads, contacts, memory, power,
     laws, count, segment, mass, speed, nx, ny, step, out,
 ):  # fmt: skip
-    """Step until the record ``out`` (n, 2) of force and deflection is full.
+    """Step until the record ``out`` (n, 2) of force (N) and deflection (m) is full.
 
     The impactor comes from the horizontal direction ``(nx, ny)``.
     """
@@ -116,14 +121,24 @@ def strike_region(
     speed: float,
     side: float = 0.0,
 ) -> BluntImpact:
-    """Strike a region of the upright body.
+    """Simulate an impact on a region of the upright body.
 
     Parameters
     ----------
-    body, joints : Body, Joints
-    region : a segment of the trunk or the head, e.g. ``chest``.
-    impactor_mass, speed : kg, m/s.
-    side : rad, where the impactor comes from: 0 from the front, pi / 2 from the left.
+    body : Body
+    joints : Joints
+    region : str
+        A segment of the trunk or the head, e.g. ``chest``.
+    impactor_mass : float
+        kg.
+    speed : float
+        m/s.
+    side : float
+        Direction from which the impactor comes, rad: 0 from the front, pi / 2 from the left.
+
+    Returns
+    -------
+    BluntImpact
     """
     n, segment = len(SEGMENTS), SEGMENTS.index(region)
     laws = np.zeros((1, KNOTS, 4))

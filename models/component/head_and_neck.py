@@ -1,4 +1,4 @@
-"""Head and neck of a body on a base so heavy that they do not move it."""
+"""Head and neck of a body on a base so heavy that it is unaffected by them."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,17 @@ def mount_neck(body: Body, joints: Joints, place: Array) -> tuple[Tree, Joints]:
 
     Parameters
     ----------
-    body, joints : whose head and neck they are.
-    place : (3,) m, where the neck's joint lies on the base, from the base's centre of mass.
+    body : Body
+        Body whose head and neck are used.
+    joints : Joints
+        Joints of the body.
+    place : (3,) array
+        Position of the neck's joint on the base, from the base's centre of mass, m.
+
+    Returns
+    -------
+    tree : Tree
+    joints : Joints
     """
     neck, head = _ROWS
     chain = [0, *_ROWS]

@@ -1,4 +1,4 @@
-"""Passive moment of a joint over its angle, the body upright and at rest."""
+"""Passive moment of a joint over its angle, with the body upright and at rest."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +23,21 @@ def _torques(tree, joints, motion, loads, power):
 
 
 def passive_moment(body: Body, joints: Joints, segment: str, angles: Array) -> Array:
-    """Return the moment (n,) N m on a segment about its own y axis (flexion and extension).
+    """Return the moment on a segment about its own y axis (flexion and extension).
 
     Parameters
     ----------
-    body, joints : Body, Joints
-    segment : outer segment of the joint, e.g. ``thigh_left`` for the hip.
-    angles : (n,) rad of the segment against its parent about y, 0 upright.
+    body : Body
+    joints : Joints
+    segment : str
+        Outer segment of the joint, e.g. ``thigh_left`` for the hip.
+    angles : (n,) array
+        Angle of the segment relative to its parent about y, 0 upright, rad.
+
+    Returns
+    -------
+    (n,) array
+        N m.
     """
     tree, i = build_tree(body), SEGMENTS.index(segment)
     motion, loads = place(standing_posture(body)), empty_loads(len(SEGMENTS))

@@ -1,7 +1,8 @@
-"""Head and neck on a falling pendulum that is stopped: 49 CFR 572.123, 6-year-old dummy.
+"""Neck pendulum test: head and neck on a falling pendulum that is stopped.
 
-The pendulum is the root of the tree, so heavy that head and neck do not move it; head and neck
-hang from it upside down with the joints and inertia of the model's own body.
+49 CFR 572.123, 6-year-old dummy. The pendulum is the root of the tree, so heavy that head and neck
+do not affect it; head and neck hang from it upside down with the joints and inertia of the model's
+own body.
 """
 
 from dataclasses import dataclass
@@ -39,9 +40,12 @@ class PendulumTest:
 
     Attributes
     ----------
-    time : (n,) s after the stop is met.
-    angle : (n,) rad, rotation of the head against the pendulum, in the direction of the test.
-    moment : (n,) N m about the occipital condyles, positive when it resists that rotation.
+    time : (n,) array
+        Time after the pendulum meets its stop, s.
+    angle : (n,) array
+        Rotation of the head relative to the pendulum, in the direction of the test, rad.
+    moment : (n,) array
+        Moment about the occipital condyles, positive when it resists that rotation, N m.
     """
 
     time: Array
@@ -61,7 +65,8 @@ def _swing(
 ):  # fmt: skip
     """Step the pendulum through its angular accelerations ``rates`` (n,) about y, rad/s2.
 
-    ``out`` (n, 3) gets the head's quaternion parts w and y and the torque of its joint about y.
+    ``out`` (n, 3) receives the head's quaternion components w and y and the torque of its joint
+    about y.
     """
     head = tree.mass.shape[0] - 1
     for k in range(rates.shape[0]):
@@ -90,11 +95,16 @@ def swing_neck(
 
     Parameters
     ----------
-    body, joints : whose head and neck hang on the pendulum.
+    body : Body
+        Body whose head and neck hang on the pendulum.
+    joints : Joints
+        Joints of the body.
     direction : {"flexion", "extension"}
-    speed : m/s of the gauge when the stop is met.
-    pulse : (k, 2) s and m/s, what the gauge has lost by then; it begins with 0, 0 and the last row
-        reaches ``speed``.
+    speed : float
+        Speed of the gauge when the stop is met, m/s.
+    pulse : (k, 2) array
+        Time (s) and speed lost by the gauge until then (m/s); the first row is 0, 0 and the last
+        row reaches ``speed``.
 
     Raises
     ------
@@ -116,7 +126,7 @@ def swing_neck(
     seat_joints(tree, motion)
     time: Array = np.arange(round(DURATION / STEP) + 1, dtype=np.float64) * STEP
     lost = np.interp(time, pulse[:, 0], pulse[:, 1])
-    # Each step's loss at its end, with none at the start: the trapezoidal sum is the whole loss.
+    # The loss of each step is applied at its end: the trapezoidal sum equals the total loss.
     rates = np.diff(lost, prepend=0.0) / (STEP * GAUGE)
     out = np.zeros((time.size, 3))
     _swing(

@@ -1,7 +1,7 @@
-"""Head and neck upright on a sled that is accelerated: adult donors of Kang 2018.
+"""Sled test of head and neck, upright on an accelerated sled: adult donors of Kang 2018.
 
-The base of the neck is the root of the tree, so heavy that head and neck do not move it; it does
-not turn. Muscles are passive, as the donors' were.
+The base of the neck is the root of the tree, so heavy that head and neck do not affect it; it does
+not rotate. Muscles are passive, as those of the donors.
 """
 
 from dataclasses import dataclass
@@ -34,8 +34,12 @@ class SledTest:
 
     Attributes
     ----------
-    time : (n,) s. rotation : (n,) rad of the head about y, flexion positive.
-    tension : (n,) N, force of the neck on the head along the neck's axis, towards the base.
+    time : (n,) array
+        s.
+    rotation : (n,) array
+        Rotation of the head about y, flexion positive, rad.
+    tension : (n,) array
+        Force of the neck on the head along the neck's axis, towards the base, N.
     """
 
     time: Array
@@ -45,7 +49,10 @@ class SledTest:
 
 @kernel
 def _ride(tree, joints, motion, loads, memory, power, pulse, step, out):
-    """Step through accelerations ``pulse`` (n,) along x, m/s2; ``out`` (n, 2) angle and tension."""
+    """Step through accelerations ``pulse`` (n,) along x, m/s2.
+
+    ``out`` (n, 2) receives rotation (rad) and tension (N).
+    """
     head = tree.mass.shape[0] - 1
     turned = 0.0
     for k in range(pulse.shape[0]):
@@ -74,8 +81,12 @@ def ride_sled(body: Body, joints: Joints, pulse: Array) -> SledTest:
 
     Parameters
     ----------
-    body, joints : whose head and neck ride on the sled.
-    pulse : (k, 2) s and m/s2, size of the acceleration over time, 0 after the last row.
+    body : Body
+        Body whose head and neck are used.
+    joints : Joints
+        Joints of the body.
+    pulse : (k, 2) array
+        Time (s) and magnitude of the acceleration (m/s2), 0 after the last row.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Stiffness corridors: lower, median and upper loading curve of a zone of a car.
 
-A corridor coordinate from 0 (lower) over 0.5 (median) to 1 (upper) picks a curve between them.
+A corridor coordinate from 0 (lower) over 0.5 (median) to 1 (upper) selects a curve between them.
 """
 
 import functools
@@ -30,7 +30,12 @@ METHODS = ("quantiles", "components")
 
 @dataclass(frozen=True)
 class Corridor:
-    """Lower, median and upper loading curve of a zone."""
+    """Lower, median and upper loading curve of a zone.
+
+    Attributes
+    ----------
+    lower, median, upper : ForceCurve
+    """
 
     lower: ForceCurve
     median: ForceCurve
@@ -53,7 +58,7 @@ class Corridor:
         """Return the curve at a coordinate: 0 lower, 0.5 median, 1 upper.
 
         Forces at equal penetration are interpolated linearly, so the curve rises wherever the
-        bounds do.
+        bounds rise.
 
         Raises
         ------
@@ -124,7 +129,7 @@ def load_corridors(name: str) -> dict[str, Corridor]:
     Raises
     ------
     ValueError
-        If there is no such file or something in it is wrong.
+        If the file does not exist or its content is invalid.
     """
     if not isinstance(name, str):
         raise ValueError(f"corridor must be a name or the path of a file, given {name!r}")
@@ -149,11 +154,12 @@ def build_corridor(curves: Sequence[ForceCurve], method: str = "quantiles") -> C
 
     Parameters
     ----------
-    curves : three or more.
+    curves : sequence of ForceCurve
+        Three or more.
     method : {"quantiles", "components"}
-        Pointwise quantiles of the forces at equal penetration, or the mean of the logarithms of the
-        forces plus and minus the normal quantile times the first principal component: a
-        stiffer or softer car as a whole.
+        Pointwise quantiles of the forces at equal penetration; or the mean of the logarithms of the
+        forces plus and minus the normal quantile times the first principal component, which makes
+        the car as a whole stiffer or softer.
 
     Raises
     ------
@@ -162,8 +168,8 @@ def build_corridor(curves: Sequence[ForceCurve], method: str = "quantiles") -> C
 
     Notes
     -----
-    Bounds are the 5 and 95 % quantiles. Curves are compared up to the median of their largest
-    penetrations; a shorter one goes on with its last slope.
+    The bounds are the 5 and 95 % quantiles. Curves are compared up to the median of their largest
+    penetrations; a shorter curve is extrapolated linearly.
     """
     if method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, given {method!r}")
@@ -181,21 +187,35 @@ def build_corridor(curves: Sequence[ForceCurve], method: str = "quantiles") -> C
         _, size, shapes = np.linalg.svd(logs - mean, full_matrices=False)
         reach = special.ndtri(1.0 - tail) * size[0] / np.sqrt(len(curves) - 1.0) * shapes[0]
         reach *= np.sign(reach.sum()) or 1.0
-        # Exponentials of a sum of shapes need not rise; a law must.
+        # The exponential of a sum of components need not rise; a force law must.
         bounds = np.maximum.accumulate(np.exp(mean + np.array([[-1.0], [0.0], [1.0]]) * reach), 1)
-        # Where the component changes sign the bounds change places.
+        # Where the component changes sign, the bounds swap.
         bounds = np.sort(bounds, axis=0)
     depth = np.concatenate([[0.0], grid])
     forces = np.pad(bounds, ((0, 0), (1, 0)))
     knots = choose_knots(depth, forces[1], MAX_KNOTS)
     ratio = float(np.median([curve.unloading_ratio for curve in curves]))
-    # Least squares may leave bounds crossed by a hair.
+    # After least squares the bounds may cross within rounding.
     fitted = np.sort([fit_loading(depth, f, knots) for f in forces], axis=0)
     return Corridor(*(ForceCurve(knots, f, ratio) for f in fitted))
 
 
 def corridor_text(corridor: Corridor, zone: str, title: str, source: str) -> str:
-    """Return a corridor file with one zone; ``load_corridors`` reads it back."""
+    """Return a corridor file with one zone, which ``load_corridors`` can read.
+
+    Parameters
+    ----------
+    corridor : Corridor
+    zone : str
+        Name of the zone.
+    title, source : str
+        Written into the file.
+
+    Returns
+    -------
+    str
+        TOML text.
+    """
 
     def knots(curve: ForceCurve) -> str:
         pairs = zip(curve.penetration, curve.force, strict=True)
@@ -220,5 +240,5 @@ def corridor_text(corridor: Corridor, zone: str, title: str, source: str) -> str
 
 
 def _quoted(text: str) -> str:
-    """Return a TOML basic string: as in JSON, but for characters that TOML wants as they are."""
+    """Return a TOML basic string: JSON quoting, except for characters that TOML writes as is."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")

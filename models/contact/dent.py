@@ -1,22 +1,22 @@
-"""What a deep contact does: where its pressure acts, and what stands in the way of its sliding.
+"""Effects of a deep contact: where the pressure acts and the ploughing resistance to sliding.
 
-A body that sinks in presses over a cap of its surface, not at its deepest point. Sections of an
-ellipsoid that are parallel to the surface struck are ellipses whose centres lie on the line from
-the deepest point to the ellipsoid's centre, so the pressure's centre lies on that line, at the
-mean depth of the pressed area:
+A body that penetrates a surface presses on a cap of its own surface, not at its deepest point.
+Sections of an ellipsoid parallel to the struck surface are ellipses whose centres lie on the line
+from the deepest point to the ellipsoid's centre, so the centre of pressure lies on that line, at
+the mean depth of the pressed area:
 
-- flesh that is flattened lies in the plane of contact, all of it at its own full depth;
-- a panel is wrapped around the body. Under an even pressure (a sheet that yields) the cap
-  ``z = d rho^2`` has its mean height at ``int d rho^2 rho drho / int rho drho = d / 2``. A pressure
+- flattened flesh lies entirely in the plane of contact, at its own full depth;
+- a panel wraps around the body. Under an even pressure (a sheet that yields) the cap
+  ``z = d rho^2`` has the mean height ``int d rho^2 rho drho / int rho drho = d / 2``. A pressure
   that grows with the local depth gives ``d / 3``, the centroid of the dented volume ``2 d / 3``.
 
-A body that slides in its own dent pushes the material before it. Only the front half of the patch
+A body that slides in its own dent pushes the material ahead of it. Only the front half of the patch
 is loaded then. With patch semi-axes ``a`` along and ``b`` across the slip and an even pressure p it
 carries the normal force ``p pi a b / 2``, and p on the groove's cross section ``(4 / 3) b d``
 resists the slip, so their ratio is ``8 d / (3 pi a)``; with ``a = sqrt(2 R d)``, R the radius of
 curvature along the slip, it is ``(4 / (3 pi)) sqrt(2 d / R)`` (for a sphere: J. Goddard and
 H. Wilman, Wear 5, 1962 [recalled]). Pressure is normal to the body's surface: the force passes near
-its centre and turns it hardly at all.
+the body's centre and hardly rotates it.
 """
 
 import math
@@ -31,12 +31,19 @@ PLOUGHING = 4.0 / (3.0 * math.pi)
 
 @inlined_kernel
 def pressure_share(flesh, dent, support):
-    """Return the share of the way from the deepest point to the centre where the pressure acts.
+    """Return the distance of the centre of pressure from the deepest point, over ``support``.
 
     Parameters
     ----------
-    flesh, dent : m, penetration of the body and of what it sinks into.
-    support : m, height of the ellipsoid's centre over its deepest point.
+    flesh, dent : float
+        Penetration of the body and of the surface, m.
+    support : float
+        Distance of the ellipsoid's centre from its tangent plane at the deepest point, m.
+
+    Returns
+    -------
+    float
+        0 at the deepest point, 1 at the ellipsoid's centre.
     """
     return min((flesh + WRAPPED * dent) / support, 1.0)
 
@@ -47,8 +54,14 @@ def ploughing_coefficient(A, support, dent, tx, ty, tz):
 
     Parameters
     ----------
-    A : six shape entries (m2) of the ellipsoid. support : m, as above. dent : m.
-    tx, ty, tz : unit vector of the slip, tangential at the deepest point.
+    A : (6,) tuple of float
+        Shape entries of the ellipsoid, m2.
+    support : float
+        As in ``pressure_share``, m.
+    dent : float
+        Penetration of the surface, m.
+    tx, ty, tz : float
+        Unit vector of the slip, tangential at the deepest point.
     """
     # The inverse shape's quadratic form gives the curvature: 1 / R = support t.A^-1 t.
     c0 = A[3] * A[5] - A[4] * A[4]

@@ -1,4 +1,4 @@
-"""Coulomb friction, regularised so that it has a value at rest."""
+"""Coulomb friction, regularised so that it is defined at rest."""
 
 import math
 
@@ -13,6 +13,18 @@ under a hard blow slower than the step (assumed)."""
 
 @inlined_kernel
 def friction_coefficient(mu, normal, slip_square, mass):
-    """Return regularised Coulomb friction as force over slip (N s/m)."""
+    """Return regularised Coulomb friction as force over slip velocity (N s/m).
+
+    Parameters
+    ----------
+    mu : float
+        Coefficient of friction.
+    normal : float
+        Normal force, N.
+    slip_square : float
+        Square of the slip velocity, m2/s2.
+    mass : float
+        Mass of the segment, kg; bounds the coefficient by ``SLIP_RATE``.
+    """
     c = mu * normal / math.sqrt(slip_square + SLIP_VELOCITY * SLIP_VELOCITY)
     return min(c, SLIP_RATE * mass)

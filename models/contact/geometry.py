@@ -2,10 +2,10 @@
 
 For two convex bodies the signed separation is the largest, over unit directions n, of the gap
 between their supporting planes: ``s(n) = n.d - h1(n) - h2(n)``, with d from the second centre to
-the first and ``h(n) = sqrt(n.A n)`` the support of an ellipsoid of shape matrix
+the first and ``h(n) = sqrt(n.A n)`` the support function of an ellipsoid of shape matrix
 ``A = R diag(a^2) R^T``. Negative s is penetration. The maximum is found by Newton's method on the
-direction, its step halved where it overshoots. Symmetric matrices are six scalars: xx, xy, xz, yy,
-yz, zz.
+direction, with the step halved where it overshoots. Symmetric matrices are stored as six scalars:
+xx, xy, xz, yy, yz, zz.
 """
 
 import math
@@ -19,7 +19,22 @@ TOLERANCE = 1e-7
 
 @inlined_kernel
 def shape_matrix(rotation, i, a2, b2, c2):
-    """Return the six entries of ``R diag(a2, b2, c2) R^T`` (m2) for ``rotation[i]``."""
+    """Return the six entries of ``R diag(a2, b2, c2) R^T`` (m2) with R = ``rotation[i]``.
+
+    Parameters
+    ----------
+    rotation : (n, 3, 3) array
+        Rotation matrices.
+    i : int
+        Row.
+    a2, b2, c2 : float
+        Squared semi-axes, m2.
+
+    Returns
+    -------
+    tuple of float
+        xx, xy, xz, yy, yz, zz.
+    """
     x0, x1, x2 = rotation[i, 0, 0], rotation[i, 0, 1], rotation[i, 0, 2]
     y0, y1, y2 = rotation[i, 1, 0], rotation[i, 1, 1], rotation[i, 1, 2]
     z0, z1, z2 = rotation[i, 2, 0], rotation[i, 2, 1], rotation[i, 2, 2]
@@ -35,10 +50,22 @@ def shape_matrix(rotation, i, a2, b2, c2):
 
 @kernel
 def roll_direction(d1, d3, p11, p13, p33):
-    """Return the separating direction (n1, n3) and separation from a point in the plane.
+    """Return the separating direction and separation of an ellipsoid from a roll's axis.
 
-    The ellipsoid, projected along the roll's axis, is an ellipse with shape ``p`` (m2) and centre
-    at ``(d1, d3)`` (m) from the roll's axis. Subtract the roll's radius for its own separation.
+    The ellipsoid is projected along the roll's axis, which gives an ellipse in the normal plane.
+    Subtract the roll's radius to get the separation from the roll.
+
+    Parameters
+    ----------
+    d1, d3 : float
+        Centre of the ellipse from the roll's axis, m.
+    p11, p13, p33 : float
+        Shape entries of the ellipse, m2.
+
+    Returns
+    -------
+    n1, n3, separation : float
+        Unit direction towards the ellipse, and separation in m.
     """
     length = math.sqrt(d1 * d1 + d3 * d3)
     if length < 1e-12:
@@ -73,11 +100,21 @@ def roll_direction(d1, d3, p11, p13, p33):
 
 @kernel
 def ellipsoid_direction(dx, dy, dz, A, B, x, y, z):
-    """Return the separating direction (nx, ny, nz) and separation of two ellipsoids.
+    """Return the separating direction and separation of two ellipsoids.
 
-    ``A`` and ``B`` are the six shape entries of the first and second ellipsoid (m2), ``d`` the
-    vector from the second centre to the first (m); n points towards the first. ``(x, y, z)`` is a
-    unit direction to start from, (0, 0, 0) to start along d.
+    Parameters
+    ----------
+    dx, dy, dz : float
+        Vector from the second centre to the first, m.
+    A, B : (6,) tuple of float
+        Shape entries of the first and the second ellipsoid, m2.
+    x, y, z : float
+        Unit direction to start from; (0, 0, 0) starts along the line of centres.
+
+    Returns
+    -------
+    nx, ny, nz, separation : float
+        Unit direction towards the first ellipsoid, and separation in m.
     """
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     if length < 1e-12:

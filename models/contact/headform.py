@@ -1,19 +1,30 @@
-"""What effects may change of a headform's contact beside the hood's curve."""
+"""Contact parameters of a headform, apart from the hood's curve, that effects may change."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class HeadformContact:
-    """The contact beside the hood's curve.
+    """Contact parameters apart from the hood's curve.
 
     Attributes
     ----------
-    friction : coefficient. damping : N s/m, while loading. onset : m over which it fades in.
-    rate_share : by which the rate of penetration raises the force at 8 m/s.
-    rate_exponent : with which it does.
-    skin_compliance : m/N, of the headform's skin in series with the hood.
-    moved_mass : kg of the hood that the headform sets in motion. moved_depth : m, over which.
+    friction : float
+        Coefficient of friction.
+    damping : float
+        Damping while loading, N s/m.
+    onset : float
+        Penetration over which the damping tapers in, m.
+    rate_share : float
+        Relative increase of the force at a penetration rate of 8 m/s.
+    rate_exponent : float
+        Exponent of the rate in that increase.
+    skin_compliance : float
+        Compliance of the headform's skin in series with the hood, m/N.
+    moved_mass : float
+        Mass of the hood that the headform accelerates, kg.
+    moved_depth : float
+        Penetration over which this mass is picked up, m.
     """
 
     friction: float

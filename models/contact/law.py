@@ -1,12 +1,12 @@
 """Force-penetration law: loading curve, unloading line, permanent part and damping.
 
-The loading curve is piecewise linear and goes on with its last slope. From the largest penetration
-``d`` reached so far, with force ``F(d)``, the contact unloads and reloads along a straight line of
+The loading curve is piecewise linear and is extrapolated linearly. From the largest penetration
+``d`` so far, with force ``F(d)``, the contact unloads and reloads along a straight line of
 slope ``ratio F(d) / d``; the line meets zero force at the permanent part ``d (1 - 1 / ratio)``. A
 viscous force acts while the penetration grows.
 
 Body and car deform in series: they carry the same force, their penetrations add and so do their
-elastic recoveries. Both stay piecewise linear, so the combined law is exact (this is MADYMO's
+elastic recoveries. Both are piecewise linear, so the combined law is exact (this is MADYMO's
 "combined" contact characteristic, in closed form).
 """
 
@@ -50,7 +50,15 @@ def _rises(penetration, force):
 
 @kernel
 def stiffest_slope(penetration, force, unloading_ratio):
-    """Return the largest slope (N/m) of a curve, loading or unloading from any penetration."""
+    """Return the largest slope (N/m) of a curve, over loading and unloading from any penetration.
+
+    Parameters
+    ----------
+    penetration, force : (k,) array
+        Knots of the loading curve, m and N.
+    unloading_ratio : float
+        Unloading slope over secant slope.
+    """
     steepest, last = 0.0, 0.0
     for k in range(1, penetration.size):
         last = (force[k] - force[k - 1]) / (penetration[k] - penetration[k - 1])
@@ -65,9 +73,12 @@ class ForceCurve:
 
     Attributes
     ----------
-    penetration, force : (k,) m and N, rising from (0, 0).
-    unloading_ratio : unloading slope over secant slope at the largest penetration, > 1.
-    damping : N s/m, while loading.
+    penetration, force : (k,) array
+        Knots in m and N, rising from (0, 0).
+    unloading_ratio : float
+        Unloading slope over secant slope at the largest penetration, > 1.
+    damping : float
+        Damping while loading, N s/m.
     """
 
     penetration: Array
@@ -88,7 +99,7 @@ class ForceCurve:
 
     @property
     def knots(self) -> list[list[float]]:
-        """Knots as data files and model options hold them: pairs of penetration and force."""
+        """Knots as stored in data files and model options: pairs of penetration and force."""
         pairs: list[list[float]] = np.stack([self.penetration, self.force], axis=1).tolist()
         return pairs
 
@@ -111,9 +122,25 @@ class ForceCurve:
 
 @kernel
 def combine_curves(surface_d, surface_f, surface_ratio, body_d, body_f, body_ratio, out):
-    """Write the law of two curves in series into ``out`` (KNOTS, 4) and return its knot count.
+    """Write the law of two curves in series and return its number of knots.
 
-    Columns: penetration (m), force (N), elastic recovery (m), penetration of the surface (m).
+    Parameters
+    ----------
+    surface_d, surface_f : (k,) array
+        Knots of the surface's loading curve, m and N.
+    surface_ratio : float
+        Unloading ratio of the surface.
+    body_d, body_f : (k,) array
+        Knots of the body's loading curve, m and N.
+    body_ratio : float
+        Unloading ratio of the body.
+    out : (KNOTS, 4) array
+        Filled: penetration (m), force (N), elastic recovery (m), penetration of the surface (m).
+
+    Returns
+    -------
+    int
+        Number of rows used.
     """
     ns, nb = surface_d.size, body_d.size
     i, j, n = 1, 1, 0
@@ -134,7 +161,7 @@ def combine_curves(surface_d, surface_f, surface_ratio, body_d, body_f, body_rat
         out[n, 1] = force
         out[n, 2] = ds / surface_ratio + db / body_ratio
         out[n, 3] = ds
-        # Knots that differ by rounding only are one knot.
+        # Knots whose forces differ only by rounding are merged.
         if i < ns and surface_f[i] <= force * (1.0 + 1e-9):
             i += 1
         if j < nb and body_f[j] <= force * (1.0 + 1e-9):
@@ -143,9 +170,9 @@ def combine_curves(surface_d, surface_f, surface_ratio, body_d, body_f, body_rat
 
 
 def law_of(curve: ForceCurve, out: Array) -> int:
-    """Write the law of one curve against a rigid body into ``out`` and return its knot count.
+    """Write the law of one curve against a rigid body into ``out`` and return its number of knots.
 
-    Columns as in ``combine_curves``.
+    The columns are those of ``combine_curves``.
     """
     count = curve.penetration.size
     out[:count, PENETRATION] = curve.penetration
@@ -157,7 +184,21 @@ def law_of(curve: ForceCurve, out: Array) -> int:
 
 @inlined_kernel
 def interpolate_law(laws, law, count, column, penetration):
-    """Return a column of combined law ``law`` at ``penetration`` (m); the last slope goes on."""
+    """Return a column of a combined law at a penetration, with linear extrapolation.
+
+    Parameters
+    ----------
+    laws : (m, KNOTS, 4) array
+        Combined laws.
+    law : int
+        Row of the law.
+    count : int
+        Number of knots used.
+    column : int
+        ``FORCE``, ``RECOVERY`` or ``SURFACE``.
+    penetration : float
+        m.
+    """
     k = 1
     while k < count - 1 and penetration > laws[law, k, 0]:
         k += 1
@@ -172,9 +213,27 @@ def contact_force(laws, law, count, damping, onset, penetration, rate, largest):
 
     Parameters
     ----------
-    laws : (m, KNOTS, 4), law : row, count : knots used.
-    damping : N s/m. onset : m, penetration over which damping fades in (0: at once).
-    penetration, rate, largest : m, m/s, m; ``largest`` already includes ``penetration``.
+    laws : (m, KNOTS, 4) array
+        Combined laws.
+    law : int
+        Row of the law.
+    count : int
+        Number of knots used.
+    damping : float
+        Damping while loading, N s/m.
+    onset : float
+        Penetration over which the damping tapers in, m; 0 applies it at once.
+    penetration : float
+        m.
+    rate : float
+        Rate of penetration, m/s.
+    largest : float
+        Largest penetration so far, ``penetration`` included, m.
+
+    Returns
+    -------
+    elastic, viscous : float
+        N.
     """
     top = interpolate_law(laws, law, count, FORCE, largest)
     if penetration >= largest:

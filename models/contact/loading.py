@@ -1,4 +1,4 @@
-"""Least-squares loading curves: rising and piecewise linear, with few knots."""
+"""Least-squares loading curves: rising, piecewise linear, with few knots."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,13 +17,20 @@ FLATTEST = 1e-3
 
 
 def fit_loading(depth: Array, force: Array, places: Array) -> Array:
-    """Return the forces (N) at the knots of the rising piecewise linear curve of least squares.
+    """Return the forces (N) at the knots of the least-squares rising piecewise linear curve.
 
     Parameters
     ----------
-    depth, force : (n,) m and N. places : (k,) m, knots, the first at 0.
+    depth, force : (n,) array
+        Measured penetration (m) and force (N).
+    places : (k,) array
+        Penetrations of the knots, m; the first is 0.
+
+    Returns
+    -------
+    (k,) array
     """
-    # Column j: how far a sample has come in segment j; slopes are non-negative.
+    # Column j: penetration of a sample within segment j; slopes are non-negative.
     widths = np.diff(places)
     basis = np.clip(depth[:, None] - places[:-1], 0.0, widths)
     basis[:, -1] = np.maximum(depth - places[-2], 0.0)
@@ -42,9 +49,12 @@ def choose_knots(
 
     Parameters
     ----------
-    depth, force : (n,) m and N.
-    most : knots at most, 2 to 8.
-    independent_samples : how many samples count; by default all. Filtered samples are correlated.
+    depth, force : (n,) array
+        Measured penetration (m) and force (N).
+    most : int
+        Largest number of knots, 2 to 8.
+    independent_samples : float, optional
+        Number of independent samples; by default all. Filtered samples are correlated.
 
     Raises
     ------
@@ -65,7 +75,7 @@ def choose_knots(
         best = min(trials, key=lambda trial: _misfit(depth, force, trial))
         best = refine_knots(depth, force, best, grid)
         best = refine_knots(depth, force, best)
-        # A knot costs two parameters: where it lies and its force.
+        # A knot costs two parameters: its penetration and its force.
         cost = 2.0 * np.log(n) * (best.size - 2)
         found = n * np.log(_misfit(depth, force, best)) + cost
         if found >= score:
@@ -75,12 +85,16 @@ def choose_knots(
 
 
 def refine_knots(depth: Array, force: Array, places: Array, grid: Array | None = None) -> Array:
-    """Return knots whose inner ones are moved, one at a time, to where the fit is best.
+    """Return knots whose inner ones have been moved, one at a time, to improve the fit.
 
     Parameters
     ----------
-    depth, force : (n,) m and N. places : (k,) m, knots to start from.
-    grid : where a knot may go; by default within half a spacing of where it is.
+    depth, force : (n,) array
+        Measured penetration (m) and force (N).
+    places : (k,) array
+        Knots to start from, m.
+    grid : (m,) array, optional
+        Candidate penetrations of a knot, m; by default within half a spacing of its present one.
     """
     end = float(places[-1])
     best = _misfit(depth, force, places)
@@ -110,7 +124,7 @@ def _is_spaced(places: Array) -> bool:
 
 
 def _misfit(depth: Array, force: Array, places: Array) -> float:
-    """Return the mean square of what a curve with these knots leaves over."""
+    """Return the mean square residual of the best curve with these knots."""
     fitted = np.interp(depth, places, fit_loading(depth, force, places))
-    # What rounding leaves of an exact fit is no misfit.
+    # A floor keeps rounding errors of an exact fit from counting as misfit.
     return float(np.mean((force - fitted) ** 2)) + (1e-6 * float(force.max())) ** 2

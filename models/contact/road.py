@@ -1,4 +1,4 @@
-"""The road as the compiled core takes it."""
+"""The road in the form that the compiled core uses."""
 
 import math
 from typing import NamedTuple
@@ -11,10 +11,16 @@ class Road(NamedTuple):
 
     Attributes
     ----------
-    friction : against the body. wet_from : m along the car's travel from first contact, beyond
-        which it is ``wet_friction``.
-    gravity_along, gravity_down : m/s2, gravity along the car's travel and into the road.
-    returned : factor on the share of the energy that the body gets back from the road.
+    friction : float
+        Coefficient of friction against the body.
+    wet_from : float
+        Distance along the car's travel from first contact beyond which the road is wet, m.
+    wet_friction : float
+        Coefficient of friction there.
+    gravity_along, gravity_down : float
+        Gravity components along the car's travel and into the road, m/s2.
+    returned : float
+        Factor on the share of the energy that the road contact returns to the body.
     """
 
     friction: float

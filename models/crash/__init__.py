@@ -1,1 +1,1 @@
-"""What all crash models share: the scenario, contact on the segments, the record, the outputs."""
+"""Code shared by all crash models: scenario, contact forces on the segments, record, outputs."""

@@ -20,7 +20,25 @@ from models.crash.surfaces import (
 
 @inlined_kernel
 def apply_road_contacts(ellipsoids, road_surface, motion, loads, contacts, tree, power):
-    """Add the loads of the road, the plane z = 0, on all segments."""
+    """Add the loads of the road, the plane z = 0, on all segments.
+
+    Parameters
+    ----------
+    ellipsoids : Ellipsoids
+        Surfaces of the segments and their contact laws.
+    road_surface : Road
+        Friction of the road.
+    motion : Motion
+        Positions and velocities of the segments.
+    loads : Loads
+        ``force`` and ``torque`` of the segments are increased in place.
+    contacts : Contacts
+        Penetrations and forces of the road contacts are updated.
+    tree : Tree or PlanarBody
+        Gives the segments' masses.
+    power : (channels,) array
+        Power (W) on the body by work channel; increased in place.
+    """
     road = contacts.zone_force.shape[0] - 1
     for i in range(tree.mass.shape[0]):
         contacts.segment_force[i, road] = 0.0
@@ -30,7 +48,7 @@ def apply_road_contacts(ellipsoids, road_surface, motion, loads, contacts, tree,
         h = math.sqrt(contacts.shape[i, 5])
         penetration = h - contacts.centre[i, 2]
         if penetration <= 0.0:
-            # Flesh recovers once it leaves the road; a car's dent does not.
+            # Flesh recovers after it leaves the road; a dent in the car does not.
             contacts.largest[i, road] = 0.0
             continue
         if penetration > contacts.largest[i, road]:
@@ -58,7 +76,23 @@ def apply_road_contacts(ellipsoids, road_surface, motion, loads, contacts, tree,
 
 @inlined_kernel
 def apply_self_contacts(ellipsoids, motion, loads, contacts, tree, power):
-    """Add the loads between segments (head and arms against the trunk, leg against leg)."""
+    """Add the loads between segments (head and arms against the trunk, leg against leg).
+
+    Parameters
+    ----------
+    ellipsoids : Ellipsoids
+        Surfaces of the segments and their contact laws.
+    motion : Motion
+        Positions and velocities of the segments.
+    loads : Loads
+        ``force`` and ``torque`` of the segments are increased in place.
+    contacts : Contacts
+        Penetrations, normals and forces of the pairs are updated.
+    tree : Tree or PlanarBody
+        Gives the segments' masses.
+    power : (channels,) array
+        Power (W) on the body by work channel; increased in place.
+    """
     for k in range(ellipsoids.pairs.shape[0]):
         contacts.pair_force[k] = 0.0
         i, j = ellipsoids.pairs[k, 0], ellipsoids.pairs[k, 1]
@@ -71,7 +105,7 @@ def apply_self_contacts(ellipsoids, motion, loads, contacts, tree, power):
             continue
         A = shape_of(contacts, i)
         B = shape_of(contacts, j)
-        # The last direction gives a lower bound on the separation, mostly enough to go on.
+        # The last direction gives a lower bound on the separation, which often rules out contact.
         nx = contacts.pair_normal[k, 0]
         ny = contacts.pair_normal[k, 1]
         nz = contacts.pair_normal[k, 2]

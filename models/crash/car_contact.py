@@ -1,7 +1,7 @@
-"""Contact of the segments with the car's front, whatever its geometry is.
+"""Contact of the segments with the car's front, independent of its geometry.
 
-The front answers where and how deep (``models.crash.front``); the law of the region gives the
-force; the segment is loaded; the front takes the reaction.
+The front returns position and depth of the contact (``models.crash.front``), the law of the region
+gives the force, which acts on the segment, and the front receives the reaction.
 """
 
 import math
@@ -42,7 +42,7 @@ HANDED_DEEPER = 0.005
 def _plough(
     motion, loads, contacts, power, tree, car, i, mx, my, nz, resistance, support, dent
 ):  # fmt: skip
-    """Add the force of a panel's dent against the slip of segment ``i``, at the ellipsoid's centre.
+    """Add the ploughing force of a panel's dent on segment ``i``, at the ellipsoid's centre.
 
     ``resistance`` (N) is the normal force times the panel's share, ``(mx, my, nz)`` the normal.
     """
@@ -67,8 +67,24 @@ def _plough(
 def apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, power):
     """Add the loads of the car on all segments, and the reactions on its front.
 
-    ``car`` is (6,): x, y of the frame's origin (m), yaw (rad) and their rates; see
-    ``models.vehicle.motion``.
+    Parameters
+    ----------
+    front : named tuple
+        Geometry of the car's front; receives the reactions.
+    ellipsoids : Ellipsoids
+        Surfaces of the segments and their contact laws.
+    car : (6,) array
+        x, y of the frame's origin (m), yaw (rad) and their rates; see ``models.vehicle.motion``.
+    motion : Motion
+        Positions and velocities of the segments.
+    loads : Loads
+        ``force`` and ``torque`` of the segments are increased in place.
+    contacts : Contacts
+        Penetrations, forces, points and normals of the car contacts are updated.
+    tree : Tree or PlanarBody
+        Gives the segments' masses.
+    power : (channels,) array
+        Power (W) on the body by work channel; increased in place.
     """
     cosine, sine = math.cos(car[2]), math.sin(car[2])
     count = patch_count(front)
@@ -79,7 +95,7 @@ def apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, po
         reach = ellipsoids.reach[i]
         for j in range(count):
             contacts.segment_force[i, j] = 0.0
-        # Less what acted before, and what acts when all zones are done.
+        # The loads before the zones are subtracted here, those after them are added below.
         for k in range(3):
             contacts.car_force[i, k] = -loads.force[i, k]
         if cx > reach or ellipsoids.surface_law[i, 0] < 0:
@@ -101,7 +117,7 @@ def apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, po
                 continue
             penetration = -separation
             if not engaged and penetration > ENTRY_DEPTH:
-                # A dent that slides across a border is as deep on its other side.
+                # A dent that moves across a border is equally deep on the other side.
                 deepest = 0.0
                 for k in range(count):
                     if are_joined(front, j, k) and contacts.engaged[i, k]:
@@ -115,7 +131,7 @@ def apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, po
             dent = law_surface(ellipsoids, law, penetration)
             support = nx * (cx - px) + ny * (cy - py) + nz * (cz - pz)
             share = pressure_share(penetration - dent, dent, support)
-            # World point of the pressure's centre, normal and relative velocity there.
+            # Centre of pressure in world axes, normal and relative velocity there.
             bx, by, bz = px + share * (cx - px), py + share * (cy - py), pz + share * (cz - pz)
             qx = car[0] + cosine * bx - sine * by
             qy = car[1] + sine * bx + cosine * by

@@ -22,14 +22,27 @@ class Ellipsoids(NamedTuple):
 
     Attributes
     ----------
-    square : (n, 3) m2, squared semi-axes. reach : (n,) m, largest semi-axis.
-    offset : (n, 3) m, ellipsoid centre from the centre of mass, own axes.
-    laws : (m, KNOTS, 4) combined laws, counts : (m,) their knots, damping : (m,) N s/m.
-    surface_law : (n, z + 1) law of a segment against a zone, -1 where they pass through each other;
-        last column the road.
-    pairs : (p, 3) first segment, second segment and law of the contacts between segments.
-    pair_gap : (p,) m, overlap of the undeformed ellipsoids that carries no force.
-    pair_friction : float.
+    square : (n, 3) array
+        Squared semi-axes, m2.
+    reach : (n,) array
+        Largest semi-axis, m.
+    offset : (n, 3) array
+        Ellipsoid centre from the centre of mass, own axes, m.
+    laws : (m, KNOTS, 4) array
+        Combined laws; see ``models.contact.law``.
+    counts : (m,) array
+        Number of knots of each law.
+    damping : (m,) array
+        Damping of each law, N s/m.
+    surface_law : (n, z + 1) array
+        Law of a segment against a zone, -1 where they pass through each other; last column the
+        road.
+    pairs : (p, 3) array
+        First segment, second segment and law of the contacts between segments.
+    pair_gap : (p,) array
+        Overlap of the undeformed ellipsoids that carries no force, m.
+    pair_friction : float
+        Coefficient of friction between segments.
     """
 
     square: Array
@@ -84,14 +97,16 @@ def build_ellipsoids(
     Parameters
     ----------
     body : Body
-    tissue : of its regions.
+    tissue : mapping of str to ForceCurve
+        Loading curve of each body region.
     zone_curves : list of ForceCurve
-        The car's zones, in order.
-    returned : factor on the share of the energy that the road gives back.
+        Loading curves of the car's zones, in order.
+    returned : float
+        Factor on the share of the energy that the road contact returns.
     """
     regions = list(tissue)
     bodies = [tissue[region] for region in regions]
-    # Surfaces: the zones, the road, and every region as the counterpart of another.
+    # Surfaces: the zones, the road, and every region as the other side of a self-contact.
     surfaces = [*zone_curves, RIGID, *bodies]
     laws = np.zeros((len(surfaces) * len(bodies), KNOTS, 4))
     counts = np.zeros(laws.shape[0], dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Where a crash begins: overlaps that are no contact, and the place where the body just touches."""
+"""Start of a crash: initial overlaps of the segments, and the position of first contact."""
 
 import numpy as np
 
@@ -15,9 +15,9 @@ SEARCH_BEHIND = -0.6
 
 @kernel
 def widen_gaps(ellipsoids, contacts):
-    """Widen the gap of every pair of segments to what overlaps now.
+    """Widen the gap of every pair of segments to their present overlap.
 
-    Neighbouring ellipsoids overlap at rest; only what goes beyond that is contact.
+    Neighbouring ellipsoids overlap at rest; only a larger overlap is contact.
     """
     for k in range(ellipsoids.pairs.shape[0]):
         i, j = ellipsoids.pairs[k, 0], ellipsoids.pairs[k, 1]
@@ -49,7 +49,17 @@ def _touches(front, ellipsoids, contacts, shift):
 
 @kernel
 def first_contact_shift(front, ellipsoids, contacts):
-    """Return the shift in x (m) that makes the body just touch the car, or NaN."""
+    """Return the shift in x (m) that brings the body just into contact with the car, or NaN.
+
+    Parameters
+    ----------
+    front : named tuple
+        Geometry of the car's front, one of the types in ``FRONTS``.
+    ellipsoids : Ellipsoids
+        Surfaces of the segments and their contact laws.
+    contacts : Contacts
+        Ellipsoid centres and shapes; unchanged.
+    """
     clear, step = SEARCH_AHEAD, 0.02
     while not _touches(front, ellipsoids, contacts, clear - step):
         clear -= step

@@ -1,9 +1,9 @@
-"""The car's front as a seam of the physics: what every geometry of it answers.
+"""The car's front as an interface: the functions that every front geometry must provide.
 
-Contact, first contact and the choice of step ask the front, not its zones. A front is a named tuple
-of arrays; its type chooses, when the kernels are compiled, the functions that answer. A new
-geometry (a surface of facets, a patch that deforms) is a named tuple, these functions for it, and
-one line in ``FRONTS``.
+Contact, first contact and the choice of step call the front, not its zones. A front is a named
+tuple of arrays; its type selects, when the kernels are compiled, the functions that are called. A
+new geometry (a surface of facets, a patch that deforms) is a named tuple, these functions for it,
+and one line in ``FRONTS``.
 """
 
 from collections.abc import Callable
@@ -17,12 +17,14 @@ from models.vehicle.zones import Zones
 
 
 class Answers(NamedTuple):
-    """The functions by which a front answers; see those of the same name in this module.
+    """The functions of a front geometry; see those of the same name in this module.
 
     Attributes
     ----------
-    patch_count, is_near, is_across, separation_of, are_joined, friction_of, ploughing_of, react :
-        compiled functions.
+    patch_count, is_near, is_across, separation_of : callable
+        Compiled functions.
+    are_joined, friction_of, ploughing_of, react : callable
+        Compiled functions.
     """
 
     patch_count: Callable[..., Any]
@@ -51,7 +53,7 @@ FRONTS: dict[type, Answers] = {
 
 
 def _answered(question):
-    """Let the type of the front choose which of its functions is compiled into a caller."""
+    """Select, by the type of the front, the function that is compiled into a caller."""
 
     @overload(question, jit_options=MERGED_FLAGS)
     def _choose(front, *rest):
@@ -63,31 +65,86 @@ def _answered(question):
 
 @_answered
 def patch_count(front):
-    """Return the number of patches that are asked one after the other."""
+    """Return the number of patches of a front."""
     raise NotImplementedError("compiled code only")
 
 
 @_answered
 def is_near(front, patch, margin, x, z):
-    """Return whether a point (m, car frame) lies within ``margin`` of a patch in side view."""
+    """Return whether a point lies within a margin of a patch in side view.
+
+    Parameters
+    ----------
+    front : named tuple
+        Geometry of the car's front.
+    patch : int
+        Row of the patch.
+    margin : float
+        m.
+    x, z : float
+        Point in the car's frame, m.
+    """
     raise NotImplementedError("compiled code only")
 
 
 @_answered
 def is_across(front, patch, margin, y):
-    """Return whether a point lies within ``margin`` (m) of the width of a patch."""
+    """Return whether a point lies within a margin of the width of a patch.
+
+    Parameters
+    ----------
+    front : named tuple
+        Geometry of the car's front.
+    patch : int
+        Row of the patch.
+    margin : float
+        m.
+    y : float
+        Lateral position in the car's frame, m.
+    """
     raise NotImplementedError("compiled code only")
 
 
 @_answered
 def separation_of(front, ellipsoids, contacts, patch, segment, cx, cy, cz, cosine, sine):
-    """Return separation, normal, contact point, weight and region of a segment and a patch."""
+    """Return the separation of a segment from a patch, with the contact geometry.
+
+    Parameters
+    ----------
+    front : named tuple
+        Geometry of the car's front.
+    ellipsoids : Ellipsoids
+        Surfaces of the segments and their contact laws.
+    contacts : Contacts
+        State and results of the contacts.
+    patch, segment : int
+        Rows of the patch and of the segment.
+    cx, cy, cz : float
+        Ellipsoid centre in the car's frame, m.
+    cosine, sine : float
+        Of the car's yaw.
+
+    Returns
+    -------
+    tuple of float
+        ``(separation, nx, ny, nz, px, py, pz, weight, region)``: separation (m, negative in
+        contact), normal and deepest point (m) in the car's frame, weight 0 to 1 of the force, and
+        region whose law applies.
+    """
     raise NotImplementedError("compiled code only")
 
 
 @_answered
 def are_joined(front, patch, other):
-    """Return whether what slides from one patch to another stays in contact."""
+    """Return whether a segment that slides from one patch to another stays in contact.
+
+    Parameters
+    ----------
+    front : named tuple
+        Geometry of the car's front.
+    patch, other : int
+        Rows of the patches.
+    """
     raise NotImplementedError("compiled code only")
 
 
@@ -99,11 +156,23 @@ def friction_of(front, region):
 
 @_answered
 def ploughing_of(front, region):
-    """Return the share of a lasting dent's resistance against slip in a region."""
+    """Return the share of the ploughing resistance of a lasting dent in a region."""
     raise NotImplementedError("compiled code only")
 
 
 @_answered
 def react(front, patch, px, py, pz, fx, fy, fz):
-    """Take the force (N, world axes) of a segment on a patch at a point (m, car frame)."""
+    """Apply the force of a segment to a patch.
+
+    Parameters
+    ----------
+    front : named tuple
+        Geometry of the car's front.
+    patch : int
+        Row of the patch.
+    px, py, pz : float
+        Point of application in the car's frame, m.
+    fx, fy, fz : float
+        Force in world axes, N.
+    """
     raise NotImplementedError("compiled code only")

@@ -1,4 +1,4 @@
-"""What crash models share behind the protocol: runs, batches, statuses."""
+"""Code that crash models share behind the protocol: runs, batches, statuses."""
 
 import math
 from abc import ABC, abstractmethod
@@ -32,7 +32,7 @@ IMPOSSIBLE_BODY = "impossible_body"
 class CrashModel(ABC):
     """A pedestrian against a braking car, from first contact to rest.
 
-    A crash model says what ``name``, ``version``, inputs and outputs it has and how it steps.
+    A subclass defines ``name``, ``version``, inputs, outputs and the step loop.
 
     Parameters
     ----------
@@ -41,18 +41,19 @@ class CrashModel(ABC):
     tick : float
         Finest step in s.
     channel_class : float
-        Channel frequency class of the head's acceleration; 0 leaves it as it is.
+        Channel frequency class of the head's acceleration; 0 leaves it unfiltered.
     angular_class : float
-        Channel frequency class of the head's angular velocity and acceleration; 0 leaves them.
+        Channel frequency class of the head's angular velocity and acceleration; 0 leaves them
+        unfiltered.
     effects : mapping, optional
-        By effect of the catalogue the values of its parameters; those left out take the median of
-        their prior.
+        Parameter values of each effect that is switched on, by effect; those left out take the
+        median of their prior.
 
     Raises
     ------
     ValueError
         If the vehicle or an effect is unknown, the step is not within 1 us to 0.2 ms, or a channel
-        frequency class is beyond what the sampling rate of 10 kHz allows.
+        frequency class is too high for the sampling rate of 10 kHz.
     """
 
     name: str
@@ -110,12 +111,16 @@ class CrashModel(ABC):
         channels: Collection[str],
         outputs: Collection[str] = (),
     ) -> Run:
-        """Run once for what a test records: only the channels and outputs that are named.
+        """Run once and return only the channels and outputs that are named.
 
         Parameters
         ----------
-        inputs : by name. channels : ``<group>_<channel>``, e.g. ``head_acceleration``.
-        outputs : by name.
+        inputs : mapping of str to float
+            Inputs left out take their nominal values.
+        channels : collection of str
+            Names ``<group>_<channel>``, e.g. ``head_acceleration``.
+        outputs : collection of str
+            Names of outputs.
 
         Raises
         ------
@@ -143,10 +148,10 @@ class CrashModel(ABC):
 
     @abstractmethod
     def _step(self, values: dict[str, float]) -> outcome.Raw | None:
-        """Return what the step loop leaves behind, or None if the body never touches the car."""
+        """Return the raw results of the step loop, or None if the body never touches the car."""
 
     def _simulate(self, values: dict[str, float]) -> outcome.Raw | str:
-        """Return what the step loop leaves behind, or the status that keeps it from starting."""
+        """Return the raw results of the step loop, or the status that prevents the run."""
         if not is_possible(values["stature"], values["body_mass"], values["head_mass"]):
             return IMPOSSIBLE_BODY
         raw = self._step(values)
@@ -185,7 +190,7 @@ class CrashModel(ABC):
     def _judge(
         self, raw: outcome.Raw, signals: outcome.Signals, wanted: Collection[str] | None = None
     ) -> tuple[str, dict[str, float]]:
-        """Return the status of a run and its outputs, or those that are wanted."""
+        """Return the status of a run and its outputs, or only the wanted ones."""
         outputs = self._empty(wanted)
         reason = END_REASONS[int(raw.summary[Summary.END_REASON])]
         if not reason.startswith("rest"):

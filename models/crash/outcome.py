@@ -1,4 +1,4 @@
-"""Outputs, histories and pictures of a finished run."""
+"""Outputs, histories and scene of a finished run."""
 
 import functools
 import math
@@ -54,7 +54,14 @@ SHORTEST_PHASE = 40
 class FilterClasses:
     """Channel frequency classes of the head's acceleration and of its angular signals, 0 for none.
 
-    A measured channel that passed another class is simulated with that class.
+    A channel that was measured with another class is simulated with that class.
+
+    Attributes
+    ----------
+    linear : float
+        Class of the acceleration.
+    angular : float
+        Class of angular velocity and acceleration.
     """
 
     linear: float = LINEAR_CLASS
@@ -63,16 +70,34 @@ class FilterClasses:
 
 @dataclass(frozen=True)
 class Raw:
-    """What the step loop leaves behind; see ``models.multibody.simulation`` for the arrays.
+    """Raw results of the step loop; see ``models.multibody.simulation`` for the arrays.
 
-    Road forces in the record may be NaN, and ``work`` empty, where a model does not have them.
+    Road forces in the record may be NaN, and ``work`` empty, where a model does not compute them.
 
     Attributes
     ----------
-    primary_end : s, when the impact on the car is over and that on the road begins, infinite if
-        the body never lands.
-    rigid_road : whether blows on the road have no limit as the step shrinks: the head's signals end
-        before them.
+    scenario : Scenario
+    classes : FilterClasses
+    chain : EffectChain
+        Effects that are switched on.
+    values : mapping of str to float
+        All inputs by name.
+    record : (rows, columns) array
+        See ``models.crash.record.Column``.
+    frames : (frames, columns) array
+        See ``models.crash.record.Frame``.
+    work : (channels,) array
+        Work on the body by channel, J.
+    head_contact : (entries,) array
+        See ``models.crash.record.HeadContact``.
+    summary : (entries,) array
+        See ``models.crash.record.Summary``.
+    primary_end : float
+        End of the impact on the car and start of that on the road, s; infinite if the body never
+        lands.
+    rigid_road : bool
+        Whether impacts on the road diverge as the step shrinks: the head's signals end before
+        them.
     """
 
     scenario: Scenario
@@ -89,12 +114,16 @@ class Raw:
 
 
 class Signals:
-    """Head signals of a run on the uniform grid, filtered; each is made when it is asked for.
+    """Head signals of a run on the uniform grid, filtered; each is computed on first access.
 
     Attributes
     ----------
-    time : (n,) s. split : sample at which the primary phase ends.
-    head_time : (k,) s, of the head's signals, which a rigid road ends with the primary phase.
+    time : (n,) array
+        s.
+    split : int
+        Sample at which the primary phase ends.
+    head_time : (k,) array
+        Time of the head's signals, s; with a rigid road it ends with the primary phase.
     """
 
     def __init__(self, raw: Raw) -> None:
@@ -107,13 +136,27 @@ class Signals:
         self.head_time = self.time[: self.split] if raw.rigid_road else self.time
 
     def sampled(self, first: int, columns: int, time: Array | None = None) -> Array:
-        """Return columns (n, columns) of the record on the grid, or at the given times."""
+        """Return columns of the record on the grid, or at the given times.
+
+        Parameters
+        ----------
+        first : int
+            First column.
+        columns : int
+            Number of columns.
+        time : (n,) array, optional
+            s; by default the uniform grid.
+
+        Returns
+        -------
+        (n, columns) array
+        """
         grid = self.time if time is None else time
         return sample_record(self._raw.record, first, columns, grid)
 
     @functools.cached_property
     def _motion(self) -> Array:
-        """Head acceleration, angular velocity and angular acceleration (n, 9) as recorded."""
+        """Head acceleration, angular velocity and angular acceleration (n, 9), unfiltered."""
         return self.sampled(Column.ACCELERATION, 9, self.head_time)
 
     @functools.cached_property
@@ -141,7 +184,7 @@ class Signals:
 
 
 def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
-    """Return how each output of a run that came to rest is had, by name."""
+    """Return the output evaluators, by name, of a run that came to rest."""
     record, time = raw.record, signals.time
     car = slice(0, signals.split)
     road = slice(signals.split, time.size)
@@ -169,7 +212,7 @@ def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
         return float(np.hypot(*path))
 
     def ground_time() -> float:
-        # A body may come to rest on its limbs, or on the car.
+        # A body may come to rest on its limbs, or on the car, without landing.
         touched = landed and math.isfinite(raw.summary[Summary.GROUND_TIME])
         return float(raw.summary[Summary.GROUND_TIME if touched else Summary.TIME])
 
@@ -200,7 +243,7 @@ def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
 
 
 def _head_contact(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
-    """Return how the outputs of the head's contact with the car are had, NaN if there was none."""
+    """Return the output evaluators of the head's contact with the car; NaN if there was none."""
     contact = raw.head_contact
     zone = int(raw.summary[Summary.HEAD_REGION])
     if not math.isfinite(contact[HeadContact.TIME]) or zone < 0:
@@ -242,9 +285,19 @@ def _head_contact(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
 def histories(
     raw: Raw, signals: Signals, wanted: Collection[str] | None = None
 ) -> dict[str, History]:
-    """Return head and contact histories on the uniform grid and the energy balance's totals.
+    """Return head and contact histories on the uniform grid and the totals of the energy balance.
 
-    Or only the channels ``<group>_<channel>`` that are wanted.
+    Parameters
+    ----------
+    raw : Raw
+    signals : Signals
+    wanted : collection of str, optional
+        Channels ``<group>_<channel>``; by default all, with the energy balance.
+
+    Returns
+    -------
+    dict of str to History
+        By group.
     """
 
     def column(k: int, time: Array) -> Callable[[], Array]:

@@ -1,4 +1,4 @@
-"""What a crash model writes down while it steps, by name, and when a body counts as at rest."""
+"""Layout of the arrays that a crash model records, and the criterion for rest."""
 
 from enum import IntEnum
 
@@ -89,7 +89,7 @@ class Frame(IntEnum):
 
 
 class Blow(IntEnum):
-    """Entries of the head's last blow on an arm."""
+    """Entries of the head's last impact on an arm."""
 
     START = 0
     VELOCITY = 1

@@ -1,4 +1,4 @@
-"""What every crash model writes down between steps: record, frames, head contact, landing, rest."""
+"""Recording between steps in every crash model: record, frames, head contact, landing, rest."""
 
 import math
 
@@ -25,9 +25,21 @@ BLOW_FORCE = 300.0
 
 @inlined_kernel
 def relative_velocity(head, motion, car):
-    """Return the velocity of the head's centre of mass relative to the car-fixed point where it is.
+    """Return the velocity of the head's centre of mass relative to the coincident point of the car.
 
-    In car axes, m/s.
+    Parameters
+    ----------
+    head : int
+        Row of the head.
+    motion : Motion
+        Positions and velocities of the segments.
+    car : (6,) array
+        x, y (m) and yaw (rad) of the car's frame and their rates.
+
+    Returns
+    -------
+    ux, uy, uz : float
+        Car axes, m/s.
     """
     ux = motion.velocity[head, 0] - car[3] + car[5] * (motion.centre[head, 1] - car[1])
     uy = motion.velocity[head, 1] - car[4] - car[5] * (motion.centre[head, 0] - car[0])
@@ -37,7 +49,25 @@ def relative_velocity(head, motion, car):
 
 @inlined_kernel
 def note_blow(time, head, ellipsoids, motion, contacts, car, blow):
-    """Note when and how fast the head ran into an arm; one blow lasts until a gap of force."""
+    """Record time and velocity of the head's impact on an arm; a pause in the force ends an impact.
+
+    Parameters
+    ----------
+    time : float
+        s.
+    head : int
+        Row of the head.
+    ellipsoids : Ellipsoids
+        Surfaces of the segments and their contact laws.
+    motion : Motion
+        Positions and velocities of the segments.
+    contacts : Contacts
+        State and results of the contacts.
+    car : (6,) array
+        x, y (m) and yaw (rad) of the car's frame and their rates.
+    blow : (BLOW_ENTRIES,) array
+        Entries ``Blow`` of the last impact; updated.
+    """
     force = 0.0
     for k in range(ellipsoids.pairs.shape[0]):
         if ellipsoids.pairs[k, 0] == head or ellipsoids.pairs[k, 1] == head:
@@ -54,10 +84,30 @@ def note_blow(time, head, ellipsoids, motion, contacts, car, blow):
 
 @inlined_kernel
 def note_head(time, head, motion, contacts, car, blow, head_contact, summary):
-    """Note the head's first contact with the car and its deepest place in it.
+    """Record the head's first contact with the car and its deepest penetration.
 
-    Its speed is that of the first blow: where the head lies on an arm that lies on the car, the
-    arm has braked it before. A model whose arms let the head pass leaves ``blow`` as it is.
+    The impact velocity is that of the first impact: where the head hits an arm that lies on the
+    car, the arm decelerates it before it reaches the car. A model in which the head passes through
+    the arms leaves ``blow`` unchanged.
+
+    Parameters
+    ----------
+    time : float
+        s.
+    head : int
+        Row of the head.
+    motion : Motion
+        Positions and velocities of the segments.
+    contacts : Contacts
+        State and results of the contacts.
+    car : (6,) array
+        x, y (m) and yaw (rad) of the car's frame and their rates.
+    blow : (BLOW_ENTRIES,) array
+        Entries ``Blow`` of the head's last impact on an arm.
+    head_contact : (HEAD_CONTACT_ENTRIES,) array
+        Entries ``HeadContact``; updated.
+    summary : (entries,) array
+        ``HEAD_REGION`` and ``HEAD_DEPTH`` are updated.
     """
     deepest = summary[Summary.HEAD_DEPTH]
     for j in range(contacts.zone_force.shape[0] - 1):
@@ -85,7 +135,25 @@ def note_head(time, head, motion, contacts, car, blow, head_contact, summary):
 
 @inlined_kernel
 def write_contact_forces(row, time, head, motion, contacts, car, record):
-    """Write time, head velocity and forces of a row of the record."""
+    """Write time, head velocity and forces into a row of the record.
+
+    Parameters
+    ----------
+    row : int
+        Row of the record.
+    time : float
+        s.
+    head : int
+        Row of the head.
+    motion : Motion
+        Positions and velocities of the segments.
+    contacts : Contacts
+        State and results of the contacts.
+    car : (6,) array
+        x, y (m) and yaw (rad) of the car's frame and their rates.
+    record : (rows, columns) array
+        Row ``row`` is filled.
+    """
     record[row, Column.TIME] = time
     ux, uy, uz = relative_velocity(head, motion, car)
     record[row, Column.RELATIVE_VELOCITY] = ux
@@ -100,7 +168,19 @@ def write_contact_forces(row, time, head, motion, contacts, car, record):
 
 @inlined_kernel
 def write_centre(row, mass, motion, record):
-    """Write the centre of gravity of a row of the record."""
+    """Write the centre of gravity into a row of the record.
+
+    Parameters
+    ----------
+    row : int
+        Row of the record.
+    mass : (n,) array
+        Masses of the segments, kg.
+    motion : Motion
+        Positions and velocities of the segments.
+    record : (rows, columns) array
+        Row ``row`` is filled.
+    """
     total = 0.0
     for k in range(3):
         record[row, Column.CENTRE + k] = 0.0
@@ -114,7 +194,23 @@ def write_centre(row, mass, motion, record):
 
 @inlined_kernel
 def write_frame(row, time, orientation, contacts, car, frames):
-    """Write a frame: time, the car's place and yaw, ellipsoid centres and quaternions."""
+    """Write a frame: time, the car's position and yaw, ellipsoid centres and quaternions.
+
+    Parameters
+    ----------
+    row : int
+        Row of the frames.
+    time : float
+        s.
+    orientation : (n, 4) array
+        Quaternions of the segments.
+    contacts : Contacts
+        State and results of the contacts.
+    car : (6,) array
+        x, y (m) and yaw (rad) of the car's frame and their rates.
+    frames : (rows, 4 + 7 n) array
+        Row ``row`` is filled.
+    """
     frames[row, Frame.TIME] = time
     for k in range(3):
         frames[row, Frame.CAR + k] = car[k]
@@ -144,13 +240,25 @@ def speeds_of(mass, motion):
 
 @inlined_kernel
 def time_at_rest(speed, spread, length, before):
-    """Return for how long (s) a body has been at rest after a step of ``length`` s."""
+    """Return the time (s) for which a body has been at rest after a step.
+
+    Parameters
+    ----------
+    speed : float
+        Speed of the centre of gravity, m/s.
+    spread : float
+        Root mean square segment speed, m/s.
+    length : float
+        Length of the step, s.
+    before : float
+        Time at rest before the step, s.
+    """
     return before + length if speed < REST_SPEED and spread < REST_SPREAD else 0.0
 
 
 @inlined_kernel
 def rest_reason(quiet, contacts):
-    """Return why a body that has been at rest for ``quiet`` s ends the run, if it does."""
+    """Return the end reason of a body that has been at rest for ``quiet`` s, or ``GOES_ON``."""
     if quiet < REST_TIME:
         return GOES_ON
     for j in range(contacts.zone_force.shape[0] - 1):
@@ -161,7 +269,17 @@ def rest_reason(quiet, contacts):
 
 @inlined_kernel
 def limit_reason(time, steps, settings):
-    """Return which limit ends the run, if one does."""
+    """Return the limit that ends the run, or ``GOES_ON``.
+
+    Parameters
+    ----------
+    time : float
+        s.
+    steps : int
+        Steps taken.
+    settings : Settings or PlanarSettings
+        Gives ``time_limit`` and ``step_limit``.
+    """
     if time >= settings.time_limit:
         return EndReason.TIME_LIMIT.value
     if steps >= settings.step_limit:
@@ -171,7 +289,21 @@ def limit_reason(time, steps, settings):
 
 @inlined_kernel
 def write_end(reason, time, steps, rows, shots, speed, summary):
-    """Write why and when a run ended, and what was written until then."""
+    """Write the end of a run and the numbers of recorded rows into the summary.
+
+    Parameters
+    ----------
+    reason : int
+        Value of ``EndReason``.
+    time : float
+        s.
+    steps, rows, shots : int
+        Numbers of steps, rows of the record and frames.
+    speed : float
+        Speed of the centre of gravity, m/s.
+    summary : (entries,) array
+        Filled.
+    """
     summary[Summary.END_REASON] = float(reason)
     summary[Summary.TIME] = time
     summary[Summary.STEPS] = float(steps)

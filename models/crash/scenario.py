@@ -1,6 +1,6 @@
-"""A crash before it is simulated: who is struck, how they run, the car and how it brakes, the road.
+"""A crash before it is simulated: pedestrian, posture, car, braking and road.
 
-It is the same for every crash model, so that models differ by their method alone.
+It is the same for every crash model, so that models differ only in their method.
 """
 
 from collections.abc import Mapping
@@ -23,13 +23,23 @@ HOOD = "hood"
 
 @dataclass(frozen=True)
 class Scenario:
-    """What a crash model is given.
+    """Input data of a crash model.
 
     Attributes
     ----------
-    posture : when the car comes, the hips over the origin. lateral_offset : m, of the hips, to the
-        left of the car's centre line.
-    ellipsoids : with no gap between neighbours yet, which each model measures in its own geometry.
+    body : Body
+    vehicle : Vehicle
+    joints : Joints
+    ellipsoids : Ellipsoids
+        Without gaps between neighbours yet; each model sets them in its own geometry.
+    zones : Zones
+        Geometry of the car's front.
+    road : Road
+    car_motion : CarMotion
+    posture : Posture
+        At first contact, the hips above the origin.
+    lateral_offset : float
+        Position of the hips to the left of the car's centre line, m.
     """
 
     body: Body
@@ -50,10 +60,11 @@ def build_scenario(
 
     Parameters
     ----------
-    inputs : mapping
+    inputs : mapping of str to float
         By name, in SI units; see ``data/multibody.toml``.
     vehicle : Vehicle
-    chain : effects that are switched on.
+    chain : EffectChain, optional
+        Effects that are switched on.
     """
     chain = chain or EffectChain()
     given = inputs

@@ -1,4 +1,4 @@
-"""When a crash must be stepped finely: while the head meets the car."""
+"""Detection of the head's impact on the car, which is stepped finely."""
 
 import math
 
@@ -17,7 +17,23 @@ HEAD_FORCE = 300.0
 
 @inlined_kernel
 def head_meets_car(head, ellipsoids, front, car, motion, contacts):
-    """Return whether the head is loaded by the car, or near and closing on it."""
+    """Return whether the head is loaded by the car, or near and closing on it.
+
+    Parameters
+    ----------
+    head : int
+        Row of the head.
+    ellipsoids : Ellipsoids
+        Surfaces of the segments and their contact laws.
+    front : named tuple
+        Geometry of the car's front, one of the types in ``FRONTS``.
+    car : (6,) array
+        x, y (m) and yaw (rad) of the car's frame and their rates.
+    motion : Motion
+        Positions and velocities of the segments.
+    contacts : Contacts
+        State and results of the contacts.
+    """
     reach = ellipsoids.reach[head]
     cosine, sine = math.cos(car[2]), math.sin(car[2])
     wx, wy = contacts.centre[head, 0] - car[0], contacts.centre[head, 1] - car[1]

@@ -1,4 +1,4 @@
-"""Contact as loads on the segments: state of the contacts, work channels, shared steps."""
+"""Contact forces as loads on the segments: contact state, work channels, shared steps."""
 
 from typing import NamedTuple
 
@@ -37,20 +37,34 @@ WORK_CHANNELS = (
 
 
 class Contacts(NamedTuple):
-    """State and results of the contacts.
+    """State and results of the contacts of ``n`` segments, ``z`` zones and ``p`` pairs.
 
     Attributes
     ----------
-    largest : (n, z + 1) m, largest penetration so far. pair_largest : (p,) m.
-    pair_normal : (p, 3) last separating direction of a pair. pair_force : (p,) N, its normal force.
-    engaged : (n, z) whether a segment entered a zone through its surface and is still in it.
-    zone_force : (z + 1,) N, sum over segments of the normal force at this instant.
-    segment_force : (n, z + 1) N, normal force at this instant.
-    car_force : (n, 3) N, all of the car's force on a segment at this instant, world axes.
-    point : (n, z, 3) m, deepest point in the car's frame at this instant.
-    normal : (n, z, 3) car-frame normal at this instant (of the nearest approach).
-    centre : (n, 3) m, ellipsoid centres, world.
-    shape : (n, 6) m2, shape matrices, world: xx, xy, xz, yy, yz, zz.
+    largest : (n, z + 1) array
+        Largest penetration so far, last column the road, m.
+    pair_largest : (p,) array
+        Largest penetration of a pair so far, m.
+    pair_normal : (p, 3) array
+        Last separating direction of a pair.
+    pair_force : (p,) array
+        Normal force of a pair, N.
+    engaged : (n, z) array of bool
+        Whether a segment entered a zone through its surface and is still in contact with it.
+    zone_force : (z + 1,) array
+        Sum over the segments of the current normal force, last entry the road, N.
+    segment_force : (n, z + 1) array
+        Current normal force, N.
+    car_force : (n, 3) array
+        Current total force of the car on a segment, world axes, N.
+    point : (n, z, 3) array
+        Current deepest point in the car's frame, m.
+    normal : (n, z, 3) array
+        Current normal in the car's frame, pointing to the segment.
+    centre : (n, 3) array
+        Ellipsoid centres, world axes, m.
+    shape : (n, 6) array
+        Shape matrices, world axes: xx, xy, xz, yy, yz, zz, m2.
     """
 
     largest: Array
@@ -68,7 +82,13 @@ class Contacts(NamedTuple):
 
 
 def empty_contacts(n: int, z: int, p: int) -> Contacts:
-    """Return the state of an untouched set of contacts."""
+    """Return the initial state of the contacts, without any penetration or force.
+
+    Parameters
+    ----------
+    n, z, p : int
+        Numbers of segments, zones and pairs of segments.
+    """
     return Contacts(
         largest=np.zeros((n, z + 1)),
         pair_largest=np.zeros(p),
@@ -87,7 +107,21 @@ def empty_contacts(n: int, z: int, p: int) -> Contacts:
 
 @inlined_kernel
 def push(motion, loads, i, px, py, pz, fx, fy, fz):
-    """Add a force at a world point to segment ``i``."""
+    """Add a force at a world point to the loads on segment ``i``.
+
+    Parameters
+    ----------
+    motion : Motion
+        Positions and velocities of the segments.
+    loads : Loads
+        ``force`` and ``torque`` of the segments are increased in place.
+    i : int
+        Row of the segment.
+    px, py, pz : float
+        Point of application, world axes, m.
+    fx, fy, fz : float
+        Force, world axes, N.
+    """
     rx, ry, rz = px - motion.centre[i, 0], py - motion.centre[i, 1], pz - motion.centre[i, 2]
     loads.force[i, 0] += fx
     loads.force[i, 1] += fy
@@ -99,7 +133,22 @@ def push(motion, loads, i, px, py, pz, fx, fy, fz):
 
 @inlined_kernel
 def point_velocity(motion, i, px, py, pz):
-    """Return the velocity (m/s) of the point of segment ``i`` that is at a world point."""
+    """Return the velocity of the point of segment ``i`` at a world position.
+
+    Parameters
+    ----------
+    motion : Motion
+        Positions and velocities of the segments.
+    i : int
+        Row of the segment.
+    px, py, pz : float
+        Position, world axes, m.
+
+    Returns
+    -------
+    vx, vy, vz : float
+        m/s.
+    """
     rx, ry, rz = px - motion.centre[i, 0], py - motion.centre[i, 1], pz - motion.centre[i, 2]
     wx = motion.angular_velocity[i, 0]
     wy = motion.angular_velocity[i, 1]
@@ -113,7 +162,17 @@ def point_velocity(motion, i, px, py, pz):
 
 @inlined_kernel
 def update_surfaces(ellipsoids, motion, contacts):
-    """Fill the ellipsoids' centres and shape matrices in world axes."""
+    """Compute the ellipsoids' centres and shape matrices in world axes.
+
+    Parameters
+    ----------
+    ellipsoids : Ellipsoids
+        Surfaces of the segments and their contact laws.
+    motion : Motion
+        Positions and velocities of the segments.
+    contacts : Contacts
+        ``centre`` and ``shape`` are filled.
+    """
     for i in range(motion.centre.shape[0]):
         x, y, z = ellipsoids.offset[i, 0], ellipsoids.offset[i, 1], ellipsoids.offset[i, 2]
         for k in range(3):
@@ -149,7 +208,26 @@ def shape_of(contacts, i):
 
 @inlined_kernel
 def law_force(ellipsoids, law, penetration, rate, largest):
-    """Return the elastic and the damping force (N) of a contact under combined law ``law``."""
+    """Return the elastic and the damping force of a contact under a combined law.
+
+    Parameters
+    ----------
+    ellipsoids : Ellipsoids
+        Surfaces of the segments and their contact laws.
+    law : int
+        Row of the combined law.
+    penetration : float
+        m.
+    rate : float
+        Rate of penetration, m/s.
+    largest : float
+        Largest penetration so far, ``penetration`` included, m.
+
+    Returns
+    -------
+    elastic, viscous : float
+        N.
+    """
     return contact_force(
         ellipsoids.laws,
         law,
@@ -164,5 +242,15 @@ def law_force(ellipsoids, law, penetration, rate, largest):
 
 @inlined_kernel
 def law_surface(ellipsoids, law, penetration):
-    """Return the surface's share (m) of a penetration (m) under combined law ``law``."""
+    """Return the surface's share (m) of a penetration under a combined law.
+
+    Parameters
+    ----------
+    ellipsoids : Ellipsoids
+        Surfaces of the segments and their contact laws.
+    law : int
+        Row of the combined law.
+    penetration : float
+        m.
+    """
     return interpolate_law(ellipsoids.laws, law, ellipsoids.counts[law], SURFACE, penetration)

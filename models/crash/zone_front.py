@@ -1,7 +1,7 @@
-"""A rigid car front made of zones, as the contacts ask it.
+"""A rigid car front made of zones: implementation of ``models.crash.front``.
 
-At its borders a zone tapers off, so that a segment passes from the hood edge to the hood with one
-contact's worth of force. A patch of this front is a zone, and so is a region.
+The force of a zone tapers off at its borders, so that a segment passes from the hood edge to the
+hood without being loaded twice. A patch of this front is a zone, and so is a region.
 """
 
 import math
@@ -25,7 +25,19 @@ def zone_count(zones):
 
 @inlined_kernel
 def zone_is_near(zones, j, margin, x, z):
-    """Return whether a point (m, car's frame) lies within ``margin`` of a zone in side view."""
+    """Return whether a point lies within a margin of a zone in side view.
+
+    Parameters
+    ----------
+    zones : Zones
+        Geometry of the front.
+    j : int
+        Row of the zone.
+    margin : float
+        m.
+    x, z : float
+        Point in the car's frame, m.
+    """
     return (
         x <= zones.box[j, 1] + margin
         and x >= zones.box[j, 0] - margin
@@ -36,13 +48,33 @@ def zone_is_near(zones, j, margin, x, z):
 
 @inlined_kernel
 def zone_is_across(zones, j, margin, y):
-    """Return whether a point lies within ``margin`` (m) of a zone's width."""
+    """Return whether a point lies within a margin of a zone's width.
+
+    Parameters
+    ----------
+    zones : Zones
+        Geometry of the front.
+    j : int
+        Row of the zone.
+    margin : float
+        m.
+    y : float
+        Lateral position in the car's frame, m.
+    """
     return abs(y) < zones.half_width[j] + margin
 
 
 @inlined_kernel
 def zones_are_joined(zones, j, k):
-    """Return whether two zones share a border: what slides across it stays in contact."""
+    """Return whether two zones share a border, across which a sliding segment stays in contact.
+
+    Parameters
+    ----------
+    zones : Zones
+        Geometry of the front.
+    j, k : int
+        Rows of the zones.
+    """
     return zones.joined[j, k]
 
 
@@ -54,13 +86,25 @@ def zone_friction(zones, j):
 
 @inlined_kernel
 def zone_ploughing(zones, j):
-    """Return the share of a lasting dent's resistance against slip in a region."""
+    """Return the share of the ploughing resistance of a lasting dent in a region."""
     return zones.ploughing[j]
 
 
 @inlined_kernel
 def zone_reaction(zones, j, px, py, pz, fx, fy, fz):
-    """Take the load on a patch: a rigid front does nothing with it."""
+    """Ignore the load on a patch: a rigid front does not respond to it.
+
+    Parameters
+    ----------
+    zones : Zones
+        Geometry of the front.
+    j : int
+        Row of the zone.
+    px, py, pz : float
+        Point of application in the car's frame, m.
+    fx, fy, fz : float
+        Force in world axes, N.
+    """
     return
 
 
@@ -71,18 +115,29 @@ def _taper(x, border):
 
 @inlined_kernel
 def zone_separation(zones, ellipsoids, contacts, j, i, cx, cy, cz, cosine, sine):
-    """Return separation, normal, contact point (car frame), border weight and region.
+    """Return the separation of a segment from a zone, with the contact geometry.
 
     Parameters
     ----------
-    j, i : zone and segment. cx, cy, cz : m, ellipsoid centre in the car's frame.
-    cosine, sine : of the car's yaw.
+    zones : Zones
+        Geometry of the front.
+    ellipsoids : Ellipsoids
+        Surfaces of the segments and their contact laws.
+    contacts : Contacts
+        State and results of the contacts.
+    j, i : int
+        Rows of the zone and of the segment.
+    cx, cy, cz : float
+        Ellipsoid centre in the car's frame, m.
+    cosine, sine : float
+        Of the car's yaw.
 
     Returns
     -------
     tuple of float
-        ``(separation, nx, ny, nz, px, py, pz, weight, region)``; a separation of 1.0 m stands for
-        "far away" and comes with weight 0.
+        ``(separation, nx, ny, nz, px, py, pz, weight, region)``: separation in m, normal and
+        deepest point in the car's frame, border weight and region; a separation of 1.0 m with
+        weight 0 means that the segment is far away.
     """
     half_width = zones.half_width[j]
     reach = ellipsoids.reach[i]
@@ -114,7 +169,7 @@ def zone_separation(zones, ellipsoids, contacts, j, i, cx, cy, cz, cosine, sine)
             or along > zones.length[j] + reach + BORDER
         ):
             return 1.0, 1.0, 0.0, 0.0, cx, cy, cz, 0.0, j
-    # Shape matrix in car axes: turn the segment's world axes by minus the yaw.
+    # Shape matrix in car axes: rotate the segment's world axes by minus the yaw.
     A = shape_of(contacts, i)
     # World components of the car-frame direction (ex, ey, 0).
     gx, gy = cosine * ex - sine * ey, sine * ex + cosine * ey

@@ -2,7 +2,7 @@
 
 *Consecutive*: held in one single interval (NHTSA CLIP). *Cumulative*: "except for intervals whose
 cumulative duration is not more than 3 milliseconds" (FMVSS 208, ECE R94 for the head). Both are
-exact for the signal joined by straight lines.
+exact for the signal interpolated linearly.
 """
 
 import numpy as np
@@ -13,14 +13,14 @@ from models.compilation import kernel
 
 @kernel
 def _time_above(t, a, cells, count, level, consecutive):
-    """Total, or longest single, time in s with the signal at or above ``level``.
+    """Return the total or the longest single time (s) with the signal at or above ``level``.
 
-    ``cells`` holds the samples at which the first ``count`` cells begin that come near the level.
+    ``cells`` holds the first samples of the ``count`` cells that may reach the level.
     """
     total, run, longest = 0.0, 0.0, 0.0
     for c in range(count):
         i = cells[c]
-        # A cell that is left out lies below the level and ends a run.
+        # A cell that is not listed lies below the level and ends a run.
         if c > 0 and cells[c - 1] != i - 1:
             run = 0.0
         a0, a1, dt = a[i] - level, a[i + 1] - level, t[i + 1] - t[i]
@@ -42,7 +42,7 @@ def _time_above(t, a, cells, count, level, consecutive):
 
 @kernel
 def _highest_level(t, a, cells, duration, low, high, consecutive):
-    """Return the highest level held; ``cells`` is room for as many as there are."""
+    """Return the highest level held; ``cells`` is workspace for all cells."""
     count = t.size - 1
     for i in range(count):
         cells[i] = i
@@ -53,7 +53,7 @@ def _highest_level(t, a, cells, duration, low, high, consecutive):
             return low
         if _time_above(t, a, cells, count, middle, consecutive) >= duration:
             low = middle
-            # What lies below this level counts for none above it.
+            # Cells below this level do not contribute at higher levels.
             kept = 0
             for c in range(count):
                 i = cells[c]
@@ -77,6 +77,7 @@ def clip_level(
     duration : float
         Held time in s.
     mode : {"cumulative", "consecutive"}
+        Whether the held time is summed over all intervals or that of one interval.
 
     Returns
     -------

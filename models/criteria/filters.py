@@ -23,10 +23,10 @@ SETTLED = 1e-3
 
 
 def settling_time(frequency_class: float) -> float:
-    """Return the time (s) by which a filter's answer reaches before and after its cause.
+    """Return the time (s) by which a filter's response extends before and after an event.
 
-    The poles of a Butterworth filter of second order decay with its corner frequency over the
-    square root of two.
+    The poles of a second-order Butterworth filter decay at its corner frequency over the square
+    root of two.
     """
     decay = 2.0 * math.pi * CUTOFF_FACTOR * frequency_class / math.sqrt(2.0)
     return math.log(1.0 / SETTLED) / decay
@@ -45,9 +45,9 @@ def _sections(frequency_class: float, sampling_rate: float) -> Array:
 
 @inlined_kernel
 def _at_rest(section, x, y, z):
-    """Return the state that constants of three columns would leave.
+    """Return the steady filter state for constant values of three columns.
 
-    The gain at frequency zero is one, so a constant goes through unchanged.
+    The gain at frequency zero is one, so a constant passes unchanged.
     """
     b0, b2, a2 = section[0], section[2], section[4]
     first, second = 1.0 - b0, b2 - a2
@@ -56,9 +56,9 @@ def _at_rest(section, x, y, z):
 
 @inlined_kernel
 def _next(section, x, y, z, state):
-    """Return the filtered samples of three columns and the state after them.
+    """Return the filtered samples of three columns and the filter state after them.
 
-    Each sample waits for the one before it, so that three columns cost hardly more than one.
+    Each sample depends on the one before it, so three columns take hardly longer than one.
     """
     b0, b1, b2, a1, a2 = section[0], section[1], section[2], section[3], section[4]
     u = b0 * x + state[0]
@@ -79,7 +79,10 @@ def _next(section, x, y, z, state):
 
 @kernel
 def _there_and_back(section, signal, longer, filtered):
-    """Filter the columns of a signal (n, k) into ``filtered``; ``longer`` is room for three."""
+    """Filter the columns of a signal (n, k) forwards and backwards into ``filtered``.
+
+    ``longer`` is workspace for three padded columns.
+    """
     n = signal.shape[0]
     size = longer.shape[0]
     pad = (size - n) // 2

@@ -4,13 +4,13 @@
 with a in g and t in s (J. Versace, 15th Stapp Car Crash Conf., 1971; NHTSA 1972).
 
 *Grid-exact*: both window ends lie on samples, as in NHTSA's reference program. *Continuous-exact*:
-the global maximum for the signal joined by straight lines, ends anywhere. At a maximum whose
-length is free, both ends stand at the level ``L = 0.6 mean`` (C. Chou and G. Nyquist, SAE 740082,
-1974). In a pair of cells the ends, the length and the area are polynomials of L, so the condition
-``L d = 0.6 area`` is a quadratic equation; with the length bound to W, the area has its maximum
-where the signal is equal at both ends, a linear equation. Every pair of cells that a bound does
-not rule out is solved in closed form, so the result is the global maximum and not a refinement of
-a grid search. Short pulses in long windows are handled: all lengths are searched, not only W.
+the global maximum for the signal interpolated linearly, with the ends anywhere. At a maximum of
+unconstrained length the signal at both ends equals ``L = 0.6 mean`` (C. Chou and G. Nyquist, SAE
+740082, 1974). In a pair of cells the ends, the length and the area are polynomials of L, so the
+condition ``L d = 0.6 area`` is a quadratic equation; with the length fixed at W, the area has its
+maximum where the signal is equal at both ends, a linear equation. Every pair of cells that a bound
+does not exclude is solved in closed form, so the result is the global maximum and not a refinement
+of a grid search. Short pulses in long windows are handled: all lengths are searched, not only W.
 """
 
 import math
@@ -39,27 +39,27 @@ def _value(area, length):
 
 @kernel
 def _may_beat(area, length, best):
-    """Return whether ``area^2.5 / length^1.5`` may exceed ``best``, by squares and no root."""
+    """Return whether ``area^2.5 / length^1.5`` may exceed ``best``, without roots."""
     square = area * area
     return square * square * area > SLACK * best * best * length * length * length
 
 
 @kernel
 def _area_at(t, a, s, i, x):
-    """Integral from the start to time ``x`` inside cell ``i``."""
+    """Return the integral from the start to time ``x`` inside cell ``i``."""
     u = x - t[i]
     return s[i] + u * (a[i] + 0.5 * u * (a[i + 1] - a[i]) / (t[i + 1] - t[i]))
 
 
 @kernel
 def _value_about_peak(t, a, s, window):
-    """Return the best value of some windows about the largest sample: a floor of the maximum."""
+    """Return the best value of some windows about the peak: a lower bound of the maximum."""
     middle, n = 0, t.size
     for i in range(n):
         if a[i] > a[middle]:
             middle = i
     floor, i, j = 0.0, middle, middle
-    # Grow by the larger neighbour: what a hand would draw.
+    # Extend the window by the larger neighbour.
     while True:
         left = i > 0 and (j == n - 1 or a[i - 1] >= a[j + 1])
         if left:
@@ -79,13 +79,13 @@ def _grid_maximum(t, a, s, window, peak):
     n = t.size
     limit = window * (1.0 + 1e-7)
     best, b1, b2 = 0.0, t[0], t[0]
-    # A little below a value that is reached, so that no maximum is ruled out.
+    # Slightly below an attained value, so that no maximum is excluded.
     floor = SLACK * _value_about_peak(t, a, s, window)
     last = 0
     for i in range(n - 1):
         while last < n - 1 and t[last + 1] - t[i] <= limit:
             last += 1
-        # No window from here can beat (area over W) * peak^1.5.
+        # No window that starts here exceeds (area over W) * peak^1.5.
         bar = max(best, floor)
         if (s[last] - s[i]) * peak * math.sqrt(peak) <= bar:
             continue
@@ -105,7 +105,7 @@ def _grid_maximum(t, a, s, window, peak):
 
 @kernel
 def _free_pair(t, a, s, i, j, window, best):
-    """Best window with ends at one level inside cells ``i`` < ``j``; (0, 0, 0) if none."""
+    """Return the best window with equal end levels in cells ``i`` < ``j``; (0, 0, 0) if none."""
     si = (a[i + 1] - a[i]) / (t[i + 1] - t[i])
     sj = (a[j + 1] - a[j]) / (t[j + 1] - t[j])
     if si == 0.0 or sj == 0.0:
@@ -138,8 +138,8 @@ def _free_pair(t, a, s, i, j, window, best):
                 level = q0 / half
             else:
                 continue
-        # A window that ends on a sample has its level at the rim of two cells: rounding must not
-        # put it outside both.
+        # A window that ends on a sample has its level on the boundary of two cells: rounding must
+        # not put it outside both.
         slack = 1e-9 * high
         if level < low - slack or level > high + slack:
             continue
@@ -165,9 +165,9 @@ def _bound_window(t, a, s, window, best, b1, b2):
         return best, b1, b2
     x = t[0]
     while True:
-        # Piece of x in which x lies in cell i and x + W in cell j.
+        # Interval of x in which x lies in cell i and x + W in cell j.
         end = min(t[i + 1], t[j + 1] - window)
-        # All of both cells is no less than what lies in the window.
+        # The area up to the ends of both cells bounds the area of the window.
         area = s[j + 1] - s[i]
         if _may_beat(area, window, best):
             si = (a[i + 1] - a[i]) / (t[i + 1] - t[i])
@@ -193,11 +193,11 @@ def _bound_window(t, a, s, window, best, b1, b2):
 
 @kernel
 def _open_end(t, a, s, window, best, b1, b2):
-    """Improve ``best`` over windows that start with the record or end with it."""
+    """Improve ``best`` over windows that start or end with the record."""
     n = t.size
     for side in range(2):
         first, last = 0, n - 1
-        # Cells further than a window from the open end hold no end of one.
+        # Cells further than W from the fixed end cannot contain the other end.
         if side == 0:
             while last > 1 and t[last - 1] - t[0] > window:
                 last -= 1
@@ -330,14 +330,19 @@ def _accumulate(t, a, area):
 
 
 def cumulative_area(time: Array, acceleration: Array) -> Array:
-    """Return the area (n,) under a signal up to each sample, joined by straight lines.
+    """Return the area (n,) under a linearly interpolated signal up to each sample.
 
     Parameters
     ----------
     time : (n,) array
         s.
     acceleration : (n,) array
-        Any unit; the area has it times seconds.
+        Any unit.
+
+    Returns
+    -------
+    (n,) array
+        Area in the unit of the signal times seconds.
     """
     area = np.empty_like(acceleration)
     _accumulate(time, acceleration, area)

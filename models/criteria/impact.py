@@ -1,4 +1,4 @@
-"""Measures of one contact: its window, the effective mass behind it, the impact angle."""
+"""Measures of one contact: its time window, the effective mass and the impact angle."""
 
 import math
 
@@ -15,7 +15,7 @@ not state its rule; 2 to 10 % moves the effective mass of measured dummy impacts
 def contact_window(
     time: ArrayLike, force: ArrayLike, end_of_contact: float = END_OF_CONTACT
 ) -> tuple[int, int]:
-    """Return first and last sample of the contact that holds the largest force.
+    """Return first and last sample of the contact that contains the peak force.
 
     Parameters
     ----------
@@ -23,6 +23,11 @@ def contact_window(
         s and N.
     end_of_contact : float
         Share of the peak force that bounds the contact on both sides.
+
+    Returns
+    -------
+    start, end : int
+        Samples.
 
     Raises
     ------
@@ -50,8 +55,8 @@ def effective_mass(
     """Return the effective mass ``int F dt / int a dt`` over the contact, in kg.
 
     Equation (1) of the reference reconstruction: resultant contact force over resultant
-    acceleration of the head, so that a neck that helps the hood to stop the head lowers the value
-    and one that loads it raises it.
+    acceleration of the head, so that a neck force that also decelerates the head lowers the value
+    and one that pushes the head into the hood raises it.
 
     Parameters
     ----------

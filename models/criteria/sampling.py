@@ -1,4 +1,4 @@
-"""Signals of a record on a uniform grid, and resultants of their axes."""
+"""Resampling of a record on a uniform grid, and resultants of vector signals."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 def _interpolate(grid, time, record, first, slope, out):
     """Fill ``out`` (n, k) with columns ``first`` to ``first + k`` of a record, linear in time.
 
-    ``slope`` (k,) is room for those between two rows.
+    ``slope`` (k,) is workspace for the slopes between two rows.
     """
     i, n, columns = 0, grid.size, out.shape[1]
     while i < n and grid[i] <= time[0]:
@@ -47,18 +47,18 @@ def _resultant(signal, out):
 
 
 def sample_record(record: Array, first: int, columns: int, grid: Array) -> Array:
-    """Return columns of a record at rising times, linear between its rows, as ``numpy.interp``.
+    """Return columns of a record at rising times, interpolated linearly as by ``numpy.interp``.
 
     Parameters
     ----------
     record : (m, w) array
         Its first column is the time in s, rising.
     first : int
-        First column that is taken.
+        First column to return.
     columns : int
-        How many are.
+        Number of columns.
     grid : (n,) array
-        Times in s, rising; before and after the record its ends are held.
+        Times in s, rising; outside the record its first or last row is returned.
 
     Returns
     -------

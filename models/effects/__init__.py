@@ -1,1 +1,1 @@
-"""Named physical effects that extend a model; off unless they are switched on."""
+"""Named physical effects that extend a model; off unless switched on."""

@@ -1,8 +1,8 @@
-"""The person saw the car coming: the limbs are part way from running to a braced stance."""
+"""Braced posture: the limbs lie between the running posture and a braced stance."""
 
 from collections.abc import Mapping
 
 
 def apply(_share: float, parameters: Mapping[str, float]) -> float:
-    """Return the share of the way from the running to the braced posture."""
+    """Return the interpolation share between the running (0) and the braced posture (1)."""
     return parameters["share"]

@@ -1,4 +1,4 @@
-"""The effects that a model has switched on, in the order of the catalogue."""
+"""The effects that a model has switched on, in catalogue order."""
 
 import functools
 from collections.abc import Mapping
@@ -18,21 +18,34 @@ class EffectChain:
 
     Attributes
     ----------
-    effects : switched on. inputs : their parameters, nominal at the values given.
+    effects : tuple of Effect
+        Effects that are switched on.
+    inputs : tuple of Input
+        Their parameters, with the given values as nominal values.
     """
 
     effects: tuple[Effect, ...] = ()
     inputs: tuple[Input, ...] = ()
 
     def act(self, stage: str, subject: Subject, values: Mapping[str, float]) -> Subject:
-        """Return what a stage hands over, changed by its effects one after the other."""
+        """Return the subject of a stage after all effects of the stage have been applied in order.
+
+        Parameters
+        ----------
+        stage : str
+            One of ``models.effects.effect.STAGES``.
+        subject : object
+            What the stage produces, e.g. a loading curve.
+        values : mapping of str to float
+            All inputs by name.
+        """
         for effect, names in self._stages.get(stage, ()):
             subject = effect.apply(subject, {name: values[key] for name, key in names})
         return subject
 
     @functools.cached_property
     def _stages(self) -> dict[str, list[tuple[Effect, list[tuple[str, str]]]]]:
-        """By stage its effects, each with its parameters and their names among the inputs."""
+        """Effects by stage, each with its parameters and their names among the inputs."""
         stages: dict[str, list[tuple[Effect, list[tuple[str, str]]]]] = {}
         for effect in self.effects:
             names = [(name, effect.input_name(name)) for name in effect.parameters]
@@ -45,8 +58,10 @@ def build_chain(model: str, chosen: Mapping[str, Mapping[str, float]] | None) ->
 
     Parameters
     ----------
-    model : name of the model.
-    chosen : by effect the values of its parameters; those left out take the prior's median.
+    model : str
+        Name of the model.
+    chosen : mapping, optional
+        Parameter values by effect; those left out take the prior's median.
 
     Raises
     ------

@@ -1,15 +1,15 @@
-"""What an effect is: a cause with a name, parameters with priors, and what it does to a model.
+"""Definition of an effect: a named cause with parameters, priors and an action on a model.
 
 An effect that is switched on adds its parameters to the model's inputs, named
-``<effect>_<parameter>``, so that an extended model is an ordinary one: its parameters are fixed or
-sampled like any other input. It acts at one stage of a run:
+``<effect>_<parameter>``, so that an extended model is an ordinary model: its parameters are fixed
+or sampled like any other input. An effect acts at one stage of a run:
 
 - ``inputs``: on the values of the model's inputs, before anything is built;
 - ``curve``: on the loading curve of the hood that the head strikes;
-- ``contact``: on what the contact does beside its curve (rate, moving mass);
-- ``braking``, ``posture``, ``road``: on the car's motion, the person's posture and the road of a
-  crash;
-- ``signal``: on what the accelerometer reads.
+- ``contact``: on the other properties of the contact (rate dependence, moving mass);
+- ``braking``, ``posture``, ``road``: on the car's motion, the pedestrian's posture and the road of
+  a crash;
+- ``signal``: on the accelerometer reading.
 """
 
 from collections.abc import Callable, Mapping
@@ -33,9 +33,11 @@ class Prior:
 
     Attributes
     ----------
-    distribution : ``lognormal`` (median, sigma of the logarithm), ``normal`` (mean, standard
-        deviation) or ``uniform`` (low, high).
-    first, second : its two numbers.
+    distribution : {"lognormal", "normal", "uniform"}
+        With the parameters median and sigma of the logarithm, mean and standard deviation, or
+        lower and upper bound.
+    first, second : float
+        The two parameters of the distribution.
     """
 
     distribution: str
@@ -46,7 +48,7 @@ class Prior:
         return f"{self.distribution} {self.first:g}, {self.second:g}"
 
     def quantile(self, probability: Array | float) -> Array:
-        """Return the values at probabilities."""
+        """Return the quantiles at the given probabilities."""
         z = np.asarray(special.ndtri(probability))
         if self.distribution == "lognormal":
             return np.asarray(self.first * np.exp(self.second * z))
@@ -55,7 +57,7 @@ class Prior:
         return np.asarray(self.first + (self.second - self.first) * np.asarray(probability))
 
     def log_density(self, value: float) -> float:
-        """Return the log density at a value, minus infinity outside."""
+        """Return the log density at a value, minus infinity outside the support."""
         if self.distribution == "lognormal":
             return float(stats.lognorm.logpdf(value, self.second, scale=self.first))
         if self.distribution == "normal":
@@ -65,11 +67,15 @@ class Prior:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of an effect: as an input of a model, with its prior and the value for none.
+    """A parameter of an effect.
 
     Attributes
     ----------
-    none : value at which the effect does nothing.
+    input : Input
+        The parameter as an input of a model.
+    prior : Prior
+    none : float
+        Null value, at which the effect vanishes.
     """
 
     input: Input
@@ -83,12 +89,28 @@ class Effect:
 
     Attributes
     ----------
-    name, title : of the cause. stage : one of ``STAGES``. models : that it applies to.
-    parameters : by name. size : the parameter that says how large the effect is.
-    forms : functional forms by name; each fixes the values of some parameters.
-    signature : where it shows. confusable : effects that look alike.
-    separated_by : the measurement that tells them apart. source : of its form and numbers.
-    apply : what the stage hands over and the parameters by name, to the same thing changed.
+    name, title : str
+        Of the cause.
+    stage : str
+        One of ``STAGES``.
+    models : tuple of str
+        Models to which it applies.
+    parameters : mapping of str to Parameter
+        By name.
+    size : str
+        Parameter that sets the size of the effect.
+    forms : mapping
+        Functional forms by name; each fixes the values of some parameters.
+    signature : str
+        How the effect shows in the data.
+    confusable : tuple of str
+        Effects with a similar signature.
+    separated_by : str
+        Measurement that distinguishes them.
+    source : str
+        Source of its form and numbers.
+    apply : callable
+        Maps the subject of the stage and the parameters by name to the changed subject.
     """
 
     name: str

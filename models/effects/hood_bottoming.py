@@ -1,7 +1,7 @@
-"""The hood meets a structure below it after a clearance.
+"""Hood bottoming: the hood meets a structure below it after a clearance.
 
-Beyond the clearance the force grows by ``stiffness * depth * (depth / 10 mm)^(power - 1)``, in
-straight pieces.
+Beyond the clearance the force grows by ``stiffness * depth * (depth / 10 mm)^(power - 1)``,
+approximated by straight segments.
 """
 
 from collections.abc import Mapping

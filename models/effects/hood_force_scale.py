@@ -1,4 +1,4 @@
-"""The hood is stiffer or softer than its curve says."""
+"""Hood force scale: the hood is stiffer or softer than its loading curve."""
 
 from collections.abc import Mapping
 

@@ -1,8 +1,8 @@
-"""The hood's own mass is set in motion: an inelastic impact spread over the first millimetres.
+"""Hood inertia: the headform accelerates a mass of the hood over the first millimetres.
 
-A mass that is moved up to penetration x, ``mass * (1 - exp(-(x / depth)^2))``, has the headform's
-speed, so the headform loses momentum to it as it is reached. It stays with the headform until they
-part.
+The mass moved up to penetration x, ``mass * (1 - exp(-(x / depth)^2))``, has the headform's speed,
+so the headform loses momentum to it (an inelastic impact, spread over the penetration). The mass
+stays with the headform until they separate.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""The hood yields beyond a force: the slope that remains is a share of the curve's."""
+"""Hood yield: beyond a force the slope is reduced to a share of the curve's slope."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -16,7 +16,7 @@ def apply(curve: ForceCurve, parameters: Mapping[str, float]) -> ForceCurve:
     begin = float(np.interp(force, f, d)) if force <= f[-1] else d[-1] + (force - f[-1]) / last
     x = d if begin in d else np.sort(np.append(d, begin))
     if begin >= x[-1]:
-        # The last slope goes on beyond the last knot: one more there tells it what is left.
+        # The curve is extrapolated linearly: one more knot gives it the reduced slope.
         x = np.append(x, begin + d[-1])
     at = curve.at(x)
     return replace(curve, penetration=x, force=np.minimum(at, force + remaining * (at - force)))

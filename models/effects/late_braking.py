@@ -1,4 +1,4 @@
-"""The car brakes only some time after it has struck."""
+"""Late braking: the car begins to brake only some time after the impact."""
 
 from collections.abc import Mapping
 
@@ -6,5 +6,5 @@ from models.vehicle.motion import CarMotion
 
 
 def apply(motion: CarMotion, parameters: Mapping[str, float]) -> CarMotion:
-    """Return the motion of the car with the effect."""
+    """Return the car's motion with the effect."""
     return motion._replace(onset=parameters["delay"])

@@ -1,10 +1,10 @@
-"""The person tensed the muscles: neck and limb joints resist more than a relaxed body's."""
+"""Muscle tone: tensed muscles stiffen the neck and raise the friction of the limb joints."""
 
 from collections.abc import Mapping
 
 
 def apply(values: Mapping[str, float], parameters: Mapping[str, float]) -> dict[str, float]:
-    """Return the inputs as they truly were."""
+    """Return the inputs with the effect."""
     tense = {
         name: values[name] * parameters["factor"] for name in ("neck_stiffness", "muscle_tone")
     }

@@ -1,7 +1,7 @@
-"""The hood is stiffer when struck faster: a dashpot, or a share of the force that grows.
+"""Rate-dependent hood: the force grows with the rate of penetration, by a dashpot or a factor.
 
-The share grows with a power of the rate while the hood is pushed in (G. Cowper, P. Symonds, Brown
-University, 1957; with exponent 1 a relative viscosity), and is nothing at rest.
+The factor's increase is a power of the rate during loading (G. Cowper, P. Symonds, Brown
+University, 1957; with exponent 1 a relative viscosity), and is zero at rest.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""What an accelerometer reads, from what it feels to what the recorder writes down."""
+"""Measurement chain of an accelerometer, from the true acceleration to the recorded signal."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,12 +14,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Reading:
-    """What an accelerometer gives before it is filtered and written down.
+    """Accelerometer signal before filtering and recording.
 
     Attributes
     ----------
-    acceleration : (n, axes) g. channel_class : of the filter, 0 for none.
-    clock : recorded duration over the true one.
+    acceleration : (n, axes) array
+        g.
+    channel_class : float
+        Channel frequency class of the filter, 0 for none.
+    clock : float
+        Recorded duration over the true one.
     """
 
     acceleration: Array
@@ -29,7 +33,15 @@ class Reading:
 
 @dataclass(frozen=True)
 class Record:
-    """What a recorder wrote down: acceleration (n, axes) in g, and its clock over the true one."""
+    """Recorded signal.
+
+    Attributes
+    ----------
+    acceleration : (n, axes) array
+        g.
+    clock : float
+        Recorded duration over the true one.
+    """
 
     acceleration: Array
     clock: float
@@ -42,17 +54,24 @@ def record_reading(
     sampling_rate: float,
     origin: int,
 ) -> Record:
-    """Return the acceleration (g) as it is written down, with the chain's effects on the signal.
+    """Return the recorded acceleration, with the chain's effects on the signal.
 
     Parameters
     ----------
-    chain : of the model. values : inputs by name.
-    reading : of a faultless accelerometer. sampling_rate : Hz.
-    origin : sample at which the recorder's clock and the true one agree.
+    chain : EffectChain
+        Effects of the model.
+    values : mapping of str to float
+        Inputs by name.
+    reading : Reading
+        Signal of an ideal accelerometer.
+    sampling_rate : float
+        Hz.
+    origin : int
+        Sample at which the recorder's clock agrees with the true one.
     """
     reading = chain.act("signal", reading, values)
     signal = reading.acceleration
-    # A corner above half the sampling rate leaves what was sampled as it is.
+    # A filter whose corner lies above half the sampling rate is left out.
     if 0.0 < CUTOFF_FACTOR * reading.channel_class < 0.5 * sampling_rate:
         signal = filter_cfc(signal, sampling_rate, reading.channel_class)
     if reading.clock != 1.0:
@@ -62,11 +81,16 @@ def record_reading(
 
 
 def retime(values: Array, clock: float, origin: int) -> Array:
-    """Return a channel (n,) as a recorder writes it whose clock is off.
+    """Return a channel as recorded by a recorder whose clock is wrong.
 
     Parameters
     ----------
-    clock : recorded duration over the true one. origin : sample at which both agree.
+    values : (n,) array
+        Channel on the true time axis.
+    clock : float
+        Recorded duration over the true one.
+    origin : int
+        Sample at which both clocks agree.
     """
     if clock == 1.0:
         return values

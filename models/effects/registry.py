@@ -1,4 +1,4 @@
-"""The catalogue: a new effect is one file, one table of data and one line here."""
+"""The catalogue of effects: a new effect is one file, one table of data and one line here."""
 
 from functools import cache
 from importlib import import_module
@@ -9,7 +9,7 @@ from models.effects.effect import STAGES, Effect, Parameter, Prior
 from models.protocol import Input
 
 EFFECTS: tuple[str, ...] = (
-    # What was set up otherwise than recorded.
+    # Deviations of the set-up from the record.
     "speed_bias",
     "mass_error",
     "hood_force_scale",
@@ -20,7 +20,7 @@ EFFECTS: tuple[str, ...] = (
     "rate_dependent_hood",
     "hood_inertia",
     "skin_compliance",
-    # The car, the person and the road of a crash.
+    # The car, the pedestrian and the road of a crash.
     "late_braking",
     "brake_dive",
     "muscle_tone",
@@ -46,7 +46,7 @@ def load_effect(name: str) -> Effect:
     Raises
     ------
     ValueError
-        If there is none of that name.
+        If the catalogue has no effect of that name.
     """
     if name not in EFFECTS:
         raise ValueError(f"no effect {name!r}; there are {', '.join(EFFECTS)}")

@@ -1,4 +1,4 @@
-"""The body springs back from the road with more, or less, energy than the tissue data say."""
+"""Restitution: the road contact returns more or less energy than the tissue data say."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""The road falls, or rises, along the car's travel."""
+"""Road slope: the road falls or rises along the car's travel."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""The signal went through another filter class than the one stated."""
+"""Sensor filter: the signal was filtered with another class than the stated one."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -7,6 +7,6 @@ from models.effects.reading import Reading
 
 
 def apply(reading: Reading, parameters: Mapping[str, float]) -> Reading:
-    """Return what the accelerometer reads with the effect."""
+    """Return the accelerometer reading with the effect."""
     used = parameters["channel_class"]
     return replace(reading, channel_class=used if used > 0.0 else reading.channel_class)

@@ -1,4 +1,4 @@
-"""The accelerometer reads too high or too low by one factor."""
+"""Sensor gain: the accelerometer reading is too high or too low by a constant factor."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -7,5 +7,5 @@ from models.effects.reading import Reading
 
 
 def apply(reading: Reading, parameters: Mapping[str, float]) -> Reading:
-    """Return what the accelerometer reads with the effect."""
+    """Return the accelerometer reading with the effect."""
     return replace(reading, acceleration=reading.acceleration * parameters["factor"])

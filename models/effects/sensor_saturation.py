@@ -1,7 +1,7 @@
-"""The accelerometer clips what is beyond its range, or gives way gradually as it nears it.
+"""Sensor saturation: the accelerometer clips at its range, or saturates gradually.
 
-A reading ``a`` becomes ``a / (1 + |a / limit|^sharpness)^(1 / sharpness)``; from a sharpness of 50
-on it is clipped.
+A reading ``a`` becomes ``a / (1 + |a / limit|^sharpness)^(1 / sharpness)``; for a sharpness of 50
+and more it is clipped.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ CLIPPING = 50.0
 
 
 def apply(reading: Reading, parameters: Mapping[str, float]) -> Reading:
-    """Return what the accelerometer reads with the effect."""
+    """Return the accelerometer reading with the effect."""
     limit, sharpness = parameters["limit"], parameters["sharpness"]
     a = reading.acceleration
     if sharpness >= CLIPPING:

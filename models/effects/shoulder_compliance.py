@@ -1,8 +1,8 @@
-"""The shoulder girdle gives way more than the data say, so that the head swings further."""
+"""Shoulder compliance: the shoulder girdle deforms more than the data say."""
 
 from collections.abc import Mapping
 
 
 def apply(values: Mapping[str, float], parameters: Mapping[str, float]) -> dict[str, float]:
-    """Return the inputs as they truly were."""
+    """Return the inputs with the effect."""
     return {**values, "shoulder_stiffness": values["shoulder_stiffness"] / parameters["factor"]}

@@ -1,4 +1,4 @@
-"""The headform's skin gives way in series with the hood, and springs back fully."""
+"""Skin compliance: the headform's skin deforms elastically in series with the hood."""
 
 from collections.abc import Mapping
 from dataclasses import replace

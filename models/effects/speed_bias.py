@@ -1,8 +1,8 @@
-"""The headform was faster or slower than recorded."""
+"""Speed bias: the true impact speed differs from the recorded one."""
 
 from collections.abc import Mapping
 
 
 def apply(values: Mapping[str, float], parameters: Mapping[str, float]) -> dict[str, float]:
-    """Return the inputs as they truly were."""
+    """Return the inputs with the effect."""
     return {**values, "impact_speed": values["impact_speed"] * parameters["factor"]}

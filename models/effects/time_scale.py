@@ -1,4 +1,4 @@
-"""The clock of the recorder runs fast or slow."""
+"""Time scale: the recorder's clock runs fast or slow."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -7,5 +7,5 @@ from models.effects.reading import Reading
 
 
 def apply(reading: Reading, parameters: Mapping[str, float]) -> Reading:
-    """Return what the accelerometer reads with the effect."""
+    """Return the accelerometer reading with the effect."""
     return replace(reading, clock=reading.clock * parameters["factor"])

@@ -1,4 +1,4 @@
-"""The hood springs back more or less than assumed."""
+"""Unloading slope: the hood returns more or less energy than assumed."""
 
 from collections.abc import Mapping
 from dataclasses import replace

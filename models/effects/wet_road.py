@@ -1,4 +1,4 @@
-"""Beyond a place the road is slippery: the friction of a body sliding on it is lower there."""
+"""Wet road: beyond a distance the friction of a sliding body is lower."""
 
 from collections.abc import Mapping
 

@@ -1,10 +1,11 @@
-"""The law of a hood from an acceleration that a low channel class has rounded.
+"""Fit of a hood's law to an acceleration that was smoothed by a low channel class.
 
 A filter of CFC 60 smears the flank and the corner of unloading over milliseconds: integrated twice,
-such a signal gives too long a way and first contact too early. Here the test is simulated with a
-trial law, the simulated acceleration passes the same filter, and the two filtered signals are
-compared. First contact, knots, slopes and unloading ratio are found by least squares; the number of
-knots by the Bayesian information criterion, as for signals that are integrated.
+such a signal gives too large a penetration and too early a first contact. Here the test is
+simulated with a trial law, the simulated acceleration passes the same filter, and the two filtered
+signals are compared. First contact, knots, slopes and unloading ratio are fitted by least squares,
+and the number of knots is chosen by the Bayesian information criterion, as for signals that are
+integrated.
 """
 
 import math
@@ -51,10 +52,16 @@ class FilteredFit:
 
     Attributes
     ----------
-    curve : ForceCurve, its last knot at the largest penetration. onset : s, first contact.
-    taken : (n,) g, what the filter has taken away of the signal, by the fitted law.
-    residual : g, root mean square that the fit leaves.
-    parameters : of the search, to start others from.
+    curve : ForceCurve
+        Its last knot is at the largest penetration.
+    onset : float
+        First contact, s.
+    taken : (n,) array
+        Part of the signal removed by the filter according to the fitted law, g.
+    residual : float
+        Root mean square residual, g.
+    parameters : array
+        Parameters of the search, from which a repeated fit can start.
     """
 
     curve: ForceCurve
@@ -66,7 +73,20 @@ class FilteredFit:
 
 @dataclass(frozen=True)
 class _Signal:
-    """What is fitted: s, g, speed (m/s), mass (kg), channel class."""
+    """The signal to fit.
+
+    Attributes
+    ----------
+    time : (n,) array
+        s.
+    acceleration : (n,) array
+        g.
+    speed : float
+        m/s.
+    mass : float
+        kg.
+    channel_class : float
+    """
 
     time: Array
     acceleration: Array
@@ -85,13 +105,30 @@ def fit_through_filter(
     onset: float,
     knots: int,
 ) -> FilteredFit:
-    """Return the law that gives a filtered acceleration when its simulation is filtered alike.
+    """Return the law whose simulated and equally filtered acceleration fits a filtered one.
 
     Parameters
     ----------
-    time, acceleration : (n,) s and g, uniform, without offset, filtered by ``channel_class``.
-    speed, mass : m/s and kg. start : law to start from. onset : s, first contact of it.
-    knots : most knots, 2 to 8.
+    time : (n,) array
+        s, uniform.
+    acceleration : (n,) array
+        Without offset, filtered by ``channel_class``, g.
+    speed : float
+        Impact speed, m/s.
+    mass : float
+        kg.
+    channel_class : float
+        Channel frequency class of the filter.
+    start : ForceCurve
+        Initial law.
+    onset : float
+        Initial first contact, s.
+    knots : int
+        Largest number of knots, 2 to 8.
+
+    Returns
+    -------
+    FilteredFit
 
     Raises
     ------
@@ -124,7 +161,26 @@ def repeat_fit(
     channel_class: float,
     parameters: Array,
 ) -> FilteredFit:
-    """Return the law of a signal like another, from the other's parameters and with its knots.
+    """Return the law of a repeated signal, starting from given parameters and with their knots.
+
+    Parameters
+    ----------
+    time : (n,) array
+        s, uniform.
+    acceleration : (n,) array
+        Without offset, filtered by ``channel_class``, g.
+    speed : float
+        Impact speed, m/s.
+    mass : float
+        kg.
+    channel_class : float
+        Channel frequency class of the filter.
+    parameters : array
+        ``FilteredFit.parameters`` of the first fit.
+
+    Returns
+    -------
+    FilteredFit
 
     Raises
     ------
@@ -136,7 +192,7 @@ def repeat_fit(
 
 
 def _segments(parameters: Array) -> int:
-    """Return the number of segments: their log slopes, and log widths of all but the last."""
+    """Return the number of segments; each has a log slope and all but the last a log width."""
     return (parameters.size - 1) // 2
 
 
@@ -156,7 +212,7 @@ def _log_ratio(ratio: float) -> float:
 
 
 def _simulate(signal: _Signal, parameters: Array) -> tuple[Array, Array, float] | None:
-    """Return the simulated acceleration (g) raw and filtered at the signal's times, and the depth.
+    """Return the simulated acceleration (g) at the signal's times, raw and filtered, and the depth.
 
     None if the contact does not end.
     """
@@ -181,13 +237,13 @@ def _simulate(signal: _Signal, parameters: Array) -> tuple[Array, Array, float] 
 
 
 def _left(signal: _Signal, parameters: Array) -> Array:
-    """Return what a law leaves of the signal (g); all of it if its contact does not end."""
+    """Return the residual (g) of a law; the whole signal if its contact does not end."""
     found = _simulate(signal, parameters)
     return signal.acceleration - (0.0 if found is None else found[1])
 
 
 def _search(signal: _Signal, start: Array) -> Array:
-    """Return the parameters of least squares, from others."""
+    """Return the least-squares parameters, starting from others."""
 
     def left(parameters: Array) -> Array:
         return _left(signal, parameters)
@@ -200,7 +256,7 @@ def _search(signal: _Signal, start: Array) -> Array:
 
 
 def _with_a_knot(signal: _Signal, parameters: Array) -> list[Array]:
-    """Return parameters of the same law with a knot more, at places that leave room for it."""
+    """Return parameters of the same law with one more knot, at the possible penetrations."""
     found = _simulate(signal, parameters)
     if found is None:
         return []
@@ -220,13 +276,13 @@ def _with_a_knot(signal: _Signal, parameters: Array) -> list[Array]:
 
 
 def _independent(signal: _Signal) -> float:
-    """Return how many samples of the filtered signal are independent."""
+    """Return the number of independent samples of the filtered signal."""
     length = float(signal.time[-1] - signal.time[0])
     return max(2.0 * CUTOFF_FACTOR * signal.channel_class * length, 4.0)
 
 
 def _score(signal: _Signal, parameters: Array, count: float) -> float:
-    """Return the Bayesian information criterion; a knot costs its place and its slope."""
+    """Return the Bayesian information criterion; a knot costs two parameters."""
     size = (1e-6 * float(signal.acceleration.max())) ** 2
     misfit = float(np.mean(_left(signal, parameters) ** 2)) + size
     return count * math.log(misfit) + 2.0 * math.log(count) * (_segments(parameters) - 1)

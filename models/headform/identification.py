@@ -1,9 +1,9 @@
-"""From the acceleration of a headform to the force-penetration curve of what it struck.
+"""Identification of the force-penetration curve of the struck surface from a headform acceleration.
 
 A piecewise linear loading curve and an unloading line are fitted to force against penetration by
-least squares; to a signal that a channel class below 1000 has rounded, the simulated and equally
-filtered signal is fitted instead. Intervals come from repeating the whole chain on the signal with
-fresh noise, and on speed and mass within their uncertainties.
+least squares. A signal smoothed by a channel class below 1000 is instead fitted by the simulated
+signal after the same filter. Intervals come from repeating the whole procedure on the signal with
+added noise, and on speed and mass within their uncertainties.
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,12 @@ UNEVEN = 1e-3
 
 @dataclass(frozen=True)
 class Bounded:
-    """A fitted value with its 95 % interval."""
+    """A fitted value with its 95 % interval.
+
+    Attributes
+    ----------
+    value, low, high : float
+    """
 
     value: float
     low: float
@@ -38,7 +43,19 @@ class Bounded:
 
 @dataclass(frozen=True)
 class _Law:
-    """A law, its largest penetration (m), its loop, misfit (N), the search through a filter."""
+    """A fitted law.
+
+    Attributes
+    ----------
+    curve : ForceCurve
+    depth : float
+        Largest penetration, m.
+    loop : Loop
+    residual : float
+        Root mean square residual, N.
+    filtered : FilteredFit, optional
+        Result of the fit through a filter.
+    """
 
     curve: ForceCurve
     depth: float
@@ -47,24 +64,32 @@ class _Law:
     filtered: FilteredFit | None = None
 
     def at(self, places: Array) -> list[float]:
-        """Return forces at places, unloading ratio, permanent and largest penetration."""
+        """Return forces at penetrations, unloading ratio, permanent and largest penetration."""
         ratio = self.curve.unloading_ratio
         return [*self.curve.at(places), ratio, self.depth * (1.0 - 1.0 / ratio), self.depth]
 
 
 @dataclass(frozen=True)
 class StiffnessFit:
-    """A fitted law.
+    """A fitted law with intervals.
 
     Attributes
     ----------
-    curve : ForceCurve, with the fitted unloading ratio.
-    force_low, force_high : (k,) N, 95 % interval of the force at each knot.
-    unloading_ratio : 1. permanent : m, where the unloading line meets zero force.
-    largest : m, penetration.
-    loop : Loop, what it was fitted to; of a signal of a low channel class with what the filter took
-        away added by the fitted law.
-    residual : N, root mean square over the loading part.
+    curve : ForceCurve
+        With the fitted unloading ratio.
+    force_low, force_high : (k,) array
+        95 % interval of the force at each knot, N.
+    unloading_ratio : Bounded
+        Dimensionless.
+    permanent : Bounded
+        Penetration at which the unloading line meets zero force, m.
+    largest : Bounded
+        Largest penetration, m.
+    loop : Loop
+        Data of the fit; for a signal of a low channel class the part removed by the filter is
+        restored from the fitted law.
+    residual : float
+        Root mean square residual over the loading part, N.
     """
 
     curve: ForceCurve
@@ -95,18 +120,37 @@ def fit_stiffness(
 
     Parameters
     ----------
-    time, acceleration : (n,) s and g, uniform. speed, mass : m/s, kg.
-    channel_class : by which the signal is filtered already; 0 for a raw signal.
-    noise : g, standard deviation of the filtered signal's noise, if known; the noise before
-        contact or the misfit of the fitted curve counts instead where it is larger.
-    speed_sd, mass_sd : standard uncertainties.
-    knots : most knots of the loading curve, 2 to 8; the information criterion may take fewer.
-    draws : repetitions for the intervals. seed : of their noise.
+    time : (n,) array_like
+        s, uniform.
+    acceleration : (n,) array_like
+        g.
+    speed : float
+        Impact speed, m/s.
+    mass : float
+        kg.
+    channel_class : float
+        Channel frequency class of the signal; 0 for a raw signal.
+    noise : float
+        Standard deviation of the filtered signal's noise, g, if known; the noise before contact or
+        the residual of the fitted curve is used instead where it is larger.
+    speed_sd, mass_sd : float
+        Standard uncertainties, m/s and kg.
+    knots : int
+        Largest number of knots of the loading curve, 2 to 8; the information criterion may choose
+        fewer.
+    draws : int
+        Repetitions for the intervals.
+    seed : int
+        Of the added noise.
+
+    Returns
+    -------
+    StiffnessFit
 
     Raises
     ------
     ValueError
-        If the signal cannot be used; the message says why.
+        If the signal cannot be used; the message gives the reason.
     """
     t = np.asarray(time, dtype=np.float64)
     a = np.asarray(acceleration, dtype=np.float64)
@@ -126,7 +170,7 @@ def fit_stiffness(
     for _ in range(draws):
         white = filter_cfc(rng.standard_normal(a.size), rate, min(channel_class, rate / 4.3))
         copy = a + level * white / white.std()
-        # Zero-mean draws of speed and mass, kept away from nonsense.
+        # Zero-mean draws of speed and mass, truncated at four standard deviations.
         v = speed + speed_sd * float(np.clip(rng.standard_normal(), -4.0, 4.0))
         m = mass + mass_sd * float(np.clip(rng.standard_normal(), -4.0, 4.0))
         try:
@@ -145,7 +189,7 @@ def fit_stiffness(
     if repeated:
         tail = 0.5 * (1.0 - CONFIDENCE)
         low, high = np.quantile(repeated, [tail, 1.0 - tail], axis=0)
-        # Centred on the fit: a second helping of noise shifts the copies a little.
+        # Centred on the fit: corrects the bootstrap bias of noise that is added twice.
         shift = best - np.median(repeated, axis=0)
         low, high = low + shift, high + shift
     n = places.size
@@ -158,7 +202,7 @@ def fit_stiffness(
 
 
 def check_uniform(time: Array) -> None:
-    """Raise ``ValueError`` unless a signal is sampled uniformly, in 8 samples or more."""
+    """Raise ``ValueError`` unless a signal has 8 or more uniformly spaced samples."""
     if time.size < 8:
         raise ValueError(
             f"the signal must be sampled uniformly, 8 samples or more, given {time.size}"
@@ -177,7 +221,7 @@ def check_uniform(time: Array) -> None:
 def _integrated(
     t: Array, a: Array, speed: float, mass: float, channel_class: float, knots: int
 ) -> _Law:
-    """Return the law of a loop that is integrated from the signal."""
+    """Return the law of a loop integrated from the signal."""
     lead = max(QUIET, settling_time(channel_class))
     loop = force_penetration(t, a, speed, mass, lead=lead)
     independent = 2.0 * CUTOFF_FACTOR * channel_class * loop.time[loop.deepest]
@@ -185,7 +229,7 @@ def _integrated(
 
 
 def _integrated_again(t: Array, a: Array, speed: float, mass: float, places: Array) -> _Law:
-    """Return the law of a signal like another, with knots near the other's."""
+    """Return the law of a repeated signal, with knots near the given ones."""
     loop = force_penetration(t, a, speed, mass)
     return _law_of(loop, refine_knots(*loop.loading, places))
 
@@ -200,7 +244,10 @@ def _law_of(loop: Loop, places: Array) -> _Law:
 def _through_filter(
     t: Array, a: Array, speed: float, mass: float, channel_class: float, near: _Law, knots: int
 ) -> _Law:
-    """Return the law whose simulated and filtered signal is the measured one, from one near it."""
+    """Return the law whose simulated and filtered signal fits the measured one.
+
+    The search starts from the law ``near``.
+    """
     settling = settling_time(channel_class)
     quiet = a[t < near.loop.onset - max(QUIET, settling)]
     offset = float(quiet.mean()) if quiet.size >= MIN_QUIET else near.loop.offset
@@ -236,6 +283,6 @@ def _fit_law(loop: Loop, places: Array) -> tuple[Array, float]:
     drop = top - loop.force[falling][kept]
     if kept.sum() < 3 or not back @ back > 0.0:
         raise ValueError("the unloading part has fewer than 3 samples: sample faster")
-    # Line through (depth, top): the orthogonal axis is penetration, so regress it on the force.
+    # Line through (depth, top): the error is in the penetration, so regress it on the force.
     slope = float(drop @ drop / (drop @ back)) if drop @ back > 0.0 else np.inf
     return force, max(min(slope * depth / top, 1e3), 1.001)

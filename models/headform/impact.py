@@ -1,8 +1,9 @@
 """A rigid headform on one zone of a car: the compiled step loop.
 
 The hood is a plane with a force-penetration law along its normal and Coulomb friction along it.
-Unknowns are the penetration, the speed along the hood and the spin that friction gives to the
-headform. Gravity is neglected: a contact lasts some 20 ms, the forces are two orders above weight.
+Unknowns are the penetration, the speed along the hood and the angular velocity that friction gives
+to the headform. Gravity is neglected: a contact lasts some 20 ms, and the forces are two orders of
+magnitude above the weight.
 """
 
 import math
@@ -22,7 +23,17 @@ SUMMARY = 7
 
 
 class Impactor(NamedTuple):
-    """The headform: mass (kg), inertia (kg m2) about a transverse axis, radius (m)."""
+    """The headform.
+
+    Attributes
+    ----------
+    mass : float
+        kg.
+    inertia : float
+        About a transverse axis, kg m2.
+    radius : float
+        m.
+    """
 
     mass: float
     inertia: float
@@ -34,11 +45,24 @@ REFERENCE_RATE = 8.0
 
 
 class Surface(NamedTuple):
-    """What is struck, beside its law.
+    """Properties of the struck surface apart from its law.
 
-    Friction, damping (N s/m) and its onset (m), share by which the rate raises the force at the
-    reference rate and the exponent with which it does, mass of the hood (kg) that the headform sets
-    in motion and the depth (m) over which it does.
+    Attributes
+    ----------
+    friction : float
+        Coefficient of friction.
+    damping : float
+        Damping while loading, N s/m.
+    onset : float
+        Penetration over which the damping tapers in, m.
+    rate_share : float
+        Relative increase of the force at the reference rate.
+    rate_exponent : float
+        Exponent of the rate in that increase.
+    moved : float
+        Mass of the hood that the headform accelerates, kg.
+    moved_depth : float
+        Penetration over which this mass is picked up, m.
     """
 
     friction: float
@@ -56,13 +80,23 @@ def strike(impactor, surface, laws, count, rate, slide, step, stride, record, su
 
     Parameters
     ----------
-    impactor, surface : Impactor, Surface
-    laws : (1, KNOTS, 4), count : knots used.
-    rate, slide : m/s, speeds into and along the surface at first contact.
-    step : s. stride : steps a sample.
-    record : (samples, COLUMNS), filled: normal and tangential force on the headform (N),
-        penetration (m), its rate (m/s), speed along the surface (m/s), spin (rad/s).
-    summary : (SUMMARY,), filled; END_TIME is NaN if the record is full before the contact ends.
+    impactor : Impactor
+    surface : Surface
+    laws : (1, KNOTS, 4) array
+        Combined law.
+    count : int
+        Number of knots used.
+    rate, slide : float
+        Speeds into and along the surface at first contact, m/s.
+    step : float
+        s.
+    stride : int
+        Steps per sample.
+    record : (samples, COLUMNS) array
+        Filled: normal and tangential force on the headform (N), penetration (m), its rate (m/s),
+        speed along the surface (m/s), angular velocity (rad/s).
+    summary : (SUMMARY,) array
+        Filled; END_TIME is NaN if the record is full before the contact ends.
     """
     mass, radius = impactor.mass, impactor.radius
     depth, deepest, spin, spent = 0.0, 0.0, 0.0, 0.0
@@ -86,7 +120,7 @@ def strike(impactor, surface, laws, count, rate, slide, step, stride, record, su
             elastic *= 1.0 + surface.rate_share * (rate / REFERENCE_RATE) ** surface.rate_exponent
         force = elastic + viscous
         if surface.moved > 0.0:
-            # Mass of the hood takes up the headform's speed as it is reached, and keeps it.
+            # Mass of the hood reaches the headform's speed when it is picked up, and keeps it.
             ratio = max(deepest, 0.0) / surface.moved_depth
             rest = math.exp(-ratio * ratio)
             if rate > 0.0 and depth >= deepest:

@@ -1,7 +1,7 @@
-"""From the acceleration of a headform to force against penetration.
+"""Force against penetration from the acceleration of a headform.
 
-The headform is taken as rigid and as not turning (perpendicular impact), so its acceleration gives
-the force by its mass and, integrated twice from first contact, the penetration.
+The headform is assumed rigid and without rotation (perpendicular impact), so its acceleration times
+its mass is the force and, integrated twice from first contact, gives the penetration.
 """
 
 from dataclasses import dataclass
@@ -43,9 +43,16 @@ class Loop:
 
     Attributes
     ----------
-    time : (n,) s after first contact. penetration : (n,) m. force : (n,) N.
-    onset : s, first contact on the signal's own time axis.
-    offset, noise : g, mean and standard deviation before contact; NaN if there is no such part.
+    time : (n,) array
+        Time after first contact, s.
+    penetration : (n,) array
+        m.
+    force : (n,) array
+        N.
+    onset : float
+        First contact on the signal's own time axis, s.
+    offset, noise : float
+        Mean and standard deviation before contact, g; the noise is NaN if there is no such part.
     """
 
     time: Array
@@ -74,14 +81,26 @@ def force_penetration(
 
     Parameters
     ----------
-    time : (n,) s, rising. acceleration : (n,) g, against the motion, already filtered.
-    speed : m/s at first contact, perpendicular to the surface. mass : kg.
-    lead : s before the flank that do not count as quiet: a filter answers before its cause.
+    time : (n,) array_like
+        s, rising.
+    acceleration : (n,) array_like
+        Deceleration, already filtered, g.
+    speed : float
+        Speed at first contact, perpendicular to the surface, m/s.
+    mass : float
+        kg.
+    lead : float
+        Time before the flank that does not count as quiet, because the filter responds before the
+        event, s.
+
+    Returns
+    -------
+    Loop
 
     Raises
     ------
     ValueError
-        If the signal has no impact in it, or ends before the headform stops.
+        If the signal contains no impact, or ends before the headform stops.
     """
     t, a = np.asarray(time, dtype=np.float64), np.asarray(acceleration, dtype=np.float64)
     if t.ndim != 1 or t.shape != a.shape or t.size < 8:
@@ -94,7 +113,7 @@ def force_penetration(
     if not a[peak] > 0.0:
         raise ValueError("the signal holds no impact: its largest value is not positive")
     offset, noise = 0.0, np.nan
-    # An offset moves the crossings from which it is sought: seek twice, from far and from near.
+    # An offset shifts the crossings from which it is estimated: estimate it twice, far and near.
     for share in (FAR, NEAR):
         start = _crossing(t, a - offset, peak, share)
         quiet = a[t < start - lead]
@@ -119,8 +138,22 @@ def integrate(
 
     Parameters
     ----------
-    time : (n,) s, rising. acceleration : (n,) g, without its offset. onset : s, first contact.
-    speed, mass : m/s and kg. offset, noise : g, for the record.
+    time : (n,) array
+        s, rising.
+    acceleration : (n,) array
+        Deceleration without its offset, g.
+    onset : float
+        First contact, s.
+    speed : float
+        Speed at first contact, m/s.
+    mass : float
+        kg.
+    offset, noise : float
+        g; stored in the result.
+
+    Returns
+    -------
+    Loop
 
     Raises
     ------
@@ -150,10 +183,10 @@ def integrate(
 
 
 def _first_contact(t: Array, a: Array, peak: int, noise: float) -> float:
-    """Return when contact began: the flank just out of the noise, extended to zero."""
+    """Return the time of first contact: the flank just above the noise, extrapolated to zero."""
     level = OUT_OF_NOISE * noise / a[peak] if np.isfinite(noise) else 0.0
     risen = _crossing(t, a, peak, min(max(level, LEAST_RISE), FAR))
-    # A slow start is known the better the longer it is followed.
+    # A slow start is estimated from a longer part of the flank.
     last = max(risen + RISE[1], _crossing(t, a, peak, SLOW))
     places = np.linspace(risen + RISE[0], last, 9)
     slope, start = np.polyfit(places, np.interp(places, t, a), 1)
@@ -163,7 +196,7 @@ def _first_contact(t: Array, a: Array, peak: int, noise: float) -> float:
 
 
 def _crossing(t: Array, a: Array, peak: int, share: float) -> float:
-    """Return when the signal last rose through a share of its peak before the peak."""
+    """Return the last time before the peak at which the signal rose through a share of it."""
     level = share * a[peak]
     below = np.flatnonzero(a[: peak + 1] < level)
     if below.size == 0:

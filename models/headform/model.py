@@ -90,8 +90,8 @@ class HeadformModel:
         ``eevc_child``, ``eevc_adult``, ``gtr_child`` or ``gtr_adult``: nominal mass, diameter,
         inertia.
     hood_curve : sequence of pairs, optional
-        Knots (penetration m, force N) from (0, 0), straight beyond the last; the input
-        ``hood_stiffness`` has no meaning then and is left out.
+        Knots (penetration m, force N) from (0, 0), extrapolated linearly; the input
+        ``hood_stiffness`` does not exist then.
     corridor : str, optional
         Name of a corridor of the data folder, or path of a corridor file (``.toml``).
     vehicle : str, optional
@@ -101,10 +101,10 @@ class HeadformModel:
     skin : {"rigid", "vinyl"}
         Whether the headform's skin deforms; the case's paper found it negligible on a hood.
     channel_class : float
-        Channel frequency class of the accelerometer; 0 leaves the signal as it is.
+        Channel frequency class of the accelerometer; 0 leaves the signal unfiltered.
     effects : mapping, optional
-        By effect of the catalogue the values of its parameters; those left out take the median of
-        their prior.
+        Parameter values of each effect that is switched on, by effect; those left out take the
+        median of their prior.
 
     Raises
     ------
@@ -201,12 +201,16 @@ class HeadformModel:
         channels: Collection[str],
         outputs: Collection[str] = (),
     ) -> Run:
-        """Run once for what a test records: only the channels and outputs that are named.
+        """Run once and return only the channels and outputs that are named.
 
         Parameters
         ----------
-        inputs : by name. channels : ``<group>_<channel>``, e.g. ``head_acceleration``.
-        outputs : by name.
+        inputs : mapping of str to float
+            Inputs left out take their nominal values.
+        channels : collection of str
+            Names ``<group>_<channel>``, e.g. ``head_acceleration``.
+        outputs : collection of str
+            Names of outputs.
 
         Raises
         ------
@@ -244,7 +248,7 @@ class HeadformModel:
         return run_rows(self, rows, lambda values: self._judge(self._strike(values)), started)
 
     def hood_curve(self, values: Mapping[str, float]) -> ForceCurve:
-        """Return the loading curve struck for inputs by name (all of them)."""
+        """Return the loading curve of the hood for all inputs by name."""
         if self._corridor is not None:
             curve = self._corridor.curve(values["hood_stiffness"])
         else:
@@ -309,7 +313,7 @@ class HeadformModel:
         )
 
     def _reading(self, record: Array, mass: float, values: Mapping[str, float]) -> Record:
-        """Return normal and tangential acceleration with flight before and after, filtered."""
+        """Return the recorded acceleration, normal and tangential, with free flight around it."""
         quiet = outcome.quiet_samples(self.channel_class)
         padded = np.zeros((record.shape[0] + 2 * quiet, 2))
         forces = record[:, NORMAL : TANGENTIAL + 1]
@@ -320,7 +324,7 @@ class HeadformModel:
     def _judge(
         self, test: Test, wanted: Collection[str] | None = None
     ) -> tuple[str, dict[str, float]]:
-        """Return the status of a test and its outputs, or those that are wanted."""
+        """Return the status of a test and its outputs, or only the wanted ones."""
         names = [item.name for item in _OUTPUTS if wanted is None or item.name in wanted]
         empty = dict.fromkeys(names, math.nan)
         if not np.all(np.isfinite(test.record)):
@@ -332,7 +336,7 @@ class HeadformModel:
 
 
 def _in_series(skin: ForceCurve | None, compliance: float, force: float) -> ForceCurve:
-    """Return a skin with a spring in series that springs back fully."""
+    """Return a skin in series with a linear elastic spring."""
     spring = ForceCurve(np.array([0.0, compliance * force]), np.array([0.0, force]), ELASTIC)
     if skin is None:
         return spring

@@ -34,9 +34,23 @@ QUIET = 0.005
 
 @dataclass(frozen=True)
 class Test:
-    """One test: impactor, initial speeds, what the loop left behind and the recorder wrote down.
+    """One test: raw results of the step loop and the recorded signal.
 
-    ``quiet`` is the number of samples of flight before and after the contact.
+    Attributes
+    ----------
+    impactor : Impactor
+    speeds : tuple of float
+        Initial speeds into and along the surface, m/s.
+    record : (samples, COLUMNS) array
+        See ``models.headform.impact.strike``.
+    reading : Record
+        Recorded normal and tangential acceleration, g.
+    summary : (SUMMARY,) array
+        See ``models.headform.impact.strike``.
+    dent : tuple of float
+        Largest and permanent penetration of the hood, m.
+    quiet : int
+        Samples of free flight before and after the contact.
     """
 
     impactor: Impactor
@@ -49,13 +63,13 @@ class Test:
 
 
 def quiet_samples(channel_class: float) -> int:
-    """Return the samples of flight before and after a contact that a filter's answer takes."""
+    """Return the samples of free flight around a contact that the filter's response needs."""
     settling = settling_time(channel_class) if channel_class > 0.0 else 0.0
     return round(max(QUIET, settling) * SAMPLING_RATE)
 
 
 def measures(test: Test) -> dict[str, Callable[[], float]]:
-    """Return how each output is had from a test that ended, by name."""
+    """Return the output evaluators, by name, of a test that ended."""
     acceleration = np.hypot(*test.reading.acceleration.T)
     time = np.arange(acceleration.size) / SAMPLING_RATE
     record, summary = test.record, test.summary
@@ -79,7 +93,7 @@ def measures(test: Test) -> dict[str, Callable[[], float]]:
 
 
 def histories(test: Test, wanted: Collection[str] | None) -> dict[str, History]:
-    """Return the histories of headform and hood, or those wanted; time 0 is first contact."""
+    """Return the histories of headform and hood, or the wanted ones; time 0 is first contact."""
     quiet = test.quiet
     record, last = test.record, test.record[-1]
     before = np.arange(-quiet, 0) / SAMPLING_RATE
@@ -94,7 +108,7 @@ def histories(test: Test, wanted: Collection[str] | None) -> dict[str, History]:
         return longer
 
     def recorded(values: Array) -> Array:
-        # One recorder for all that is measured.
+        # All measured channels share one recorder.
         return retime(values, test.reading.clock, quiet)
 
     sources: dict[str, dict[str, tuple[str, Callable[[], Array]]]] = {

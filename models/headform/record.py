@@ -1,8 +1,9 @@
-"""The first impact in a record of acceleration, and what else the record holds.
+"""Detection of the first impact in a record of acceleration, and notes on the rest of the record.
 
-A record may begin with disturbances (a release, a spike of the electronics) and go on after the
-impact: the headform falls on the floor, often harder than on the hood. The impact is the first
-event that takes most of the recorded speed away; what comes before and after is left out and told.
+A record may begin with disturbances (a release, an electronic spike) and continue after the impact:
+the headform falls on the floor, often with a harder impact than that on the hood. The impact is the
+first event that removes most of the recorded speed; what comes before and after is left out and
+reported.
 """
 
 from dataclasses import dataclass
@@ -56,8 +57,10 @@ class Impact:
 
     Attributes
     ----------
-    time, acceleration : (n,) s and g, the record without what is left out.
-    notes : what was left out and what is wrong.
+    time, acceleration : (n,) array
+        The record without the parts left out, s and g.
+    notes : tuple of str
+        What was left out, and problems of the signal.
     """
 
     time: Array
@@ -67,7 +70,17 @@ class Impact:
 
 @dataclass(frozen=True)
 class _Event:
-    """Samples from ``start`` to before ``stop``; speed (m/s) that they take; largest g."""
+    """An event of a record.
+
+    Attributes
+    ----------
+    start, stop : int
+        First sample and the sample after the last.
+    speed : float
+        Change of speed, m/s.
+    peak : float
+        Largest acceleration, g.
+    """
 
     start: int
     stop: int
@@ -82,13 +95,18 @@ def first_impact(
 
     Parameters
     ----------
-    time : (n,) s, uniform. acceleration : (n,) g, finite, against the motion.
-    speed : m/s, before the impact.
-    reach : s by which the signal's filter answers before and after an event.
+    time : (n,) array_like
+        s, uniform.
+    acceleration : (n,) array_like
+        Deceleration, finite, g.
+    speed : float
+        Speed before the impact, m/s.
+    reach : float
+        Time by which the response of the signal's filter extends before and after an event, s.
 
     Notes
     -----
-    A record in which no event takes half of the speed comes back whole.
+    A record in which no event removes half of the speed is returned complete.
     """
     t = np.asarray(time, dtype=np.float64)
     a = np.array(acceleration, dtype=np.float64)
@@ -108,7 +126,7 @@ def first_impact(
         return Impact(t, a, tuple(notes))
     own, first, last = events[impact], 0, t.size
     later = events[impact + 1 :]
-    # A contact that has not stopped the headform yet goes on in its next peak.
+    # If the headform has not stopped yet, the next peak belongs to the same contact.
     while later and own.speed < STOPPED * speed and (later[0].start - own.stop) * step < SLOWEST:
         own = _Event(own.start, later[0].stop, own.speed + later[0].speed,
                      max(own.peak, later[0].peak))  # fmt: skip
@@ -141,7 +159,7 @@ def first_impact(
 
 
 def _remove_spikes(t: Array, a: Array, step: float) -> list[str]:
-    """Replace single samples far from both neighbours, in place; return what was replaced."""
+    """Replace isolated outlying samples in place and return notes on them."""
     middle = 0.5 * (a[:-2] + a[2:])
     away = a[1:-1] - middle
     noise = float(np.median(np.abs(away))) / 0.6745
@@ -149,7 +167,7 @@ def _remove_spikes(t: Array, a: Array, step: float) -> list[str]:
     lonely = (np.abs(away) > max(OUT_OF_NOISE * noise, SPIKE * size)) & (
         np.abs(a[2:] - a[:-2]) < LONELY * np.abs(away)
     )
-    # A spike's own neighbours lie away from their middle as well, by half of it.
+    # The neighbours of a spike deviate from their own mean as well, by half of its height.
     places = [
         k for k in np.flatnonzero(lonely)
         if abs(away[k]) >= np.abs(away[max(k - 1, 0) : k + 2]).max()
@@ -172,12 +190,12 @@ def _averaged(a: Array, step: float) -> Array:
 
 
 def _base(a: Array) -> float:
-    """Return about where the sensor stands without an impact: before it, or after it."""
+    """Return the approximate zero level of the sensor, from before or after the impact."""
     return float(min(np.median(a[:5]), np.median(a[-max(5, a.size // 5) :])))
 
 
 def _events(a: Array, step: float, speed: float) -> list[_Event]:
-    """Return the stretches in which the averaged signal is up, in order."""
+    """Return the events, in order, in which the averaged signal exceeds the level."""
     smooth = _averaged(a, step)
     level = min(LEVEL * float(smooth.max()), 0.5 * speed / (STANDARD_GRAVITY * SLOWEST))
     if not level > 0.0:
@@ -189,7 +207,7 @@ def _events(a: Array, step: float, speed: float) -> list[_Event]:
             joined[-1][1] = stop
         else:
             joined.append([start, stop])
-    # A soft one has begun before it reaches the level.
+    # A soft event begins before it reaches the level.
     foot = _stretches(smooth > FOOT * smooth.max())
     for k, (start, _) in enumerate(joined):
         free = joined[k - 1][1] + 1 if k else 0
@@ -203,14 +221,14 @@ def _events(a: Array, step: float, speed: float) -> list[_Event]:
 
 
 def _stretches(inside: NDArray[np.bool_]) -> list[list[int]]:
-    """Return first sample and end of each stretch of samples that are inside."""
+    """Return first sample and end of each run of true samples."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], inside, [0]]).astype(int)))
     found: list[list[int]] = edges.reshape(-1, 2).tolist()
     return found
 
 
 def _clipping(t: Array, a: Array) -> str:
-    """Return what to say of a peak that looks clipped, or nothing."""
+    """Return a note on a peak that seems clipped, or an empty string."""
     top = float(a.max())
     flat = a >= TOP * top
     if flat.sum() < MIN_FLAT or flat.sum() < CLIPPED * np.sum(a >= SHOULDER * top):

@@ -1,10 +1,10 @@
-"""Joints that yield along and across: three springs and dampers between the two joint points.
+"""Joints that yield in translation: three springs and dampers between the two joint points.
 
-The child's joint point is free; a force holds it at its place on the parent. The stretch is taken
-in the parent's axes, with a stiffness of its own on either side of zero (tension and compression
-of a neck), and force and reaction act at the same point, the child's, so that neither momentum is
-lost: these are three slide joints with springs before the spherical one. Beyond its range a spring
-is stiffer: what in a body would tear still holds.
+The child's joint point is free; a force holds it at its position on the parent. The stretch is
+expressed in the parent's axes, with separate stiffness for either sign (tension and compression of
+a neck). Force and reaction act at the same point, the child's, so that linear and angular momentum
+are conserved: this equals three slide joints with springs before the spherical joint. Beyond its
+range a spring is stiffer: tissue that would tear still carries force in the model.
 """
 
 import math
@@ -17,7 +17,19 @@ BEYOND = 5.0
 
 @inlined_kernel
 def spring_force(joints, i, k, stretch):
-    """Return the force (N) that pulls a stretch (m) back."""
+    """Return the restoring force (N) of a spring of a joint that yields.
+
+    Parameters
+    ----------
+    joints : Joints or PlanarJoints
+        Gives stiffness and range.
+    i : int
+        Row of the joint.
+    k : int
+        Axis of the parent, 0 to 2.
+    stretch : float
+        m.
+    """
     stiffness = joints.give_high[i, k] if stretch > 0.0 else joints.give_low[i, k]
     beyond = max(abs(stretch) - joints.give_range[i], 0.0)
     return stiffness * (stretch + math.copysign((BEYOND - 1.0) * beyond, stretch))
@@ -25,9 +37,20 @@ def spring_force(joints, i, k, stretch):
 
 @inlined_kernel
 def apply_bushings(tree, joints, motion, loads, power):
-    """Write ``loads.joint_force`` of the joints that yield; add elastic and damping power (W).
+    """Compute the forces of the joints that yield and add their power.
 
-    ``power[0]`` gets the elastic part, ``power[1]`` damping.
+    Parameters
+    ----------
+    tree : Tree
+        Constant data of the segments.
+    joints : Joints
+        Stiffness, damping and friction of the joints.
+    motion : Motion
+        Positions and velocities of the segments.
+    loads : Loads
+        ``joint_force`` (world axes, N) is filled.
+    power : (channels,) array
+        W; ``power[0]`` is increased by the elastic part, ``power[1]`` by damping.
     """
     for i in range(1, tree.mass.shape[0]):
         if not tree.yields[i]:
@@ -37,7 +60,7 @@ def apply_bushings(tree, joints, motion, loads, power):
         wx = motion.angular_velocity[p, 0]
         wy = motion.angular_velocity[p, 1]
         wz = motion.angular_velocity[p, 2]
-        # Velocity of the child's joint point against the point of the parent that is there.
+        # Velocity of the child's joint point relative to the coincident point of the parent.
         vx = motion.joint_velocity[i, 0] - motion.joint_velocity[p, 0] - wy * dz + wz * dy
         vy = motion.joint_velocity[i, 1] - motion.joint_velocity[p, 1] - wz * dx + wx * dz
         vz = motion.joint_velocity[i, 2] - motion.joint_velocity[p, 2] - wx * dy + wy * dx

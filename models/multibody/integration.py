@@ -1,4 +1,4 @@
-"""Second-order time stepping with one force evaluation a step.
+"""Second-order time stepping with one force evaluation per step.
 
 Velocity Verlet with a predicted velocity (L. Verlet, Phys. Rev. 159, 1967; the prediction serves
 the velocity-dependent terms)::
@@ -6,8 +6,9 @@ the velocity-dependent terms)::
     x1 = x0 + h v0 + h^2/2 a0        v* = v0 + h a0
     a1 = a(x1, v*)                   v1 = v0 + h/2 (a0 + a1)
 
-For forces of position alone it is symplectic; damping is stable while its rate is below ``1/h``.
-Stepped are the root's centre of mass, the joint points that yield, and all orientations.
+For forces that depend on position alone it is symplectic; damping is stable while its rate is below
+``1/h``. The state consists of the root's centre of mass, the joint points that yield, and all
+orientations.
 """
 
 from typing import NamedTuple
@@ -22,12 +23,18 @@ Array = NDArray[np.float64]
 
 
 class Memory(NamedTuple):
-    """Rates at the start of a step, of ``n`` segments.
+    """Rates of ``n`` segments at the start of a step.
 
     Attributes
     ----------
-    spin, spin_rate : (n, 3) rad/s, rad/s2. velocity, acceleration : (n, 3) m/s, m/s2, of the root's
-        centre of mass (row 0) and of joint points that yield.
+    spin : (n, 3) array
+        Angular velocity, rad/s.
+    spin_rate : (n, 3) array
+        Angular acceleration, rad/s2.
+    velocity : (n, 3) array
+        Velocity of the root's centre of mass (row 0) and of joint points that yield, m/s.
+    acceleration : (n, 3) array
+        Acceleration of the same points, m/s2.
     """
 
     spin: Array
@@ -37,13 +44,27 @@ class Memory(NamedTuple):
 
 
 def empty_memory(n: int) -> Memory:
-    """Return the memory for ``n`` segments."""
+    """Return zero rates for ``n`` segments."""
     return Memory(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)))
 
 
 @inlined_kernel
 def predict(tree, motion, loads, memory, h):
-    """Advance positions by ``h`` seconds, keep the old rates, and predict the new ones."""
+    """Advance positions by one step, store the old rates, and predict the new ones.
+
+    Parameters
+    ----------
+    tree : Tree
+        Constant data of the segments.
+    motion : Motion
+        Positions and velocities are changed in place.
+    loads : Loads
+        Accelerations at the start of the step.
+    memory : Memory
+        Filled with the rates at the start of the step.
+    h : float
+        Length of the step, s.
+    """
     n = motion.orientation.shape[0]
     half = 0.5 * h * h
     for k in range(3):
@@ -73,7 +94,21 @@ def predict(tree, motion, loads, memory, h):
 
 @inlined_kernel
 def correct(tree, motion, loads, memory, h):
-    """Replace the predicted rates by the trapezoidal ones."""
+    """Replace the predicted rates by the trapezoidal ones.
+
+    Parameters
+    ----------
+    tree : Tree
+        Constant data of the segments.
+    motion : Motion
+        Velocities are changed in place.
+    loads : Loads
+        Accelerations at the end of the step.
+    memory : Memory
+        Rates at the start of the step.
+    h : float
+        Length of the step, s.
+    """
     half = 0.5 * h
     for k in range(3):
         motion.root_velocity[k] = memory.velocity[0, k] + half * (

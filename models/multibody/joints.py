@@ -1,9 +1,9 @@
 """Resistance of the spherical joints: range of motion, stops, damping and friction.
 
-The rotation of a child relative to the centre of its range is taken as a rotation vector
+The rotation of a child relative to the centre of its range is expressed as a rotation vector
 ``phi = log(q_centre* q_parent* q_child)`` with components about the child's axes: x lateral
 (abduction), y flexion, z twist. Each component has a passive stiffness about its neutral value and
-a stop on either side; a stop's stiffness fades in over ``onset`` rad, so the torque is smooth::
+a stop on either side; a stop's stiffness tapers in over ``onset`` rad, so the torque is smooth::
 
     dU/dphi = k (phi - phi0) + K e^2 / (2 onset)     0 < e < onset,  e = excess beyond the range
               k (phi - phi0) + K (e - onset / 2)     e > onset
@@ -31,9 +31,9 @@ DEGREE = 11
 def _logarithm_polynomials() -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Return two functions of a unit quaternion's scalar part w as polynomials in 2 w - 1.
 
-    ``2 h / sin h`` turns the vector part into the rotation vector, ``(1 - h cot h) / (2 h)^2`` is
-    the second coefficient of J_r^-T, with w = cos h. Both are analytic on [0, 1], nearest pole
-    w = -1, so degree 11 holds them to 1e-8 without a root, a quotient or an arc tangent.
+    ``2 h / sin h`` converts the vector part into the rotation vector, ``(1 - h cot h) / (2 h)^2``
+    is the second coefficient of J_r^-T, with w = cos h. Both are analytic on [0, 1], nearest pole
+    w = -1, so degree 11 approximates them to 1e-8 without a root, a quotient or an arc tangent.
     """
     nodes = 0.5 * (np.cos((np.arange(200) + 0.5) * np.pi / 200.0) + 1.0)
     h = np.arccos(nodes)
@@ -61,9 +61,20 @@ def _component_torque(joints, i, k, phi):
 
 @inlined_kernel
 def apply_joint_torques(tree, joints, motion, loads, power):
-    """Write ``loads.joint_torque`` (world axes); add elastic and damping power (W) to ``power``.
+    """Compute the joint torques and add their power.
 
-    ``power[0]`` gets the elastic part, ``power[1]`` damping and friction.
+    Parameters
+    ----------
+    tree : Tree
+        Constant data of the segments.
+    joints : Joints
+        Stiffness, damping and friction of the joints.
+    motion : Motion
+        Positions and velocities of the segments.
+    loads : Loads
+        ``joint_torque`` (world axes, N m) is filled.
+    power : (channels,) array
+        W; ``power[0]`` is increased by the elastic part, ``power[1]`` by damping and friction.
     """
     for i in range(1, tree.mass.shape[0]):
         p = tree.parent[i]
@@ -96,7 +107,7 @@ def apply_joint_torques(tree, joints, motion, loads, power):
         z = w0 * z2 + x0 * y2 - y0 * x2 + z0 * w2
         if w < 0.0:
             w, x, y, z = -w, -x, -y, -z
-        # Even and odd powers apart: four short chains instead of two long ones.
+        # Even and odd powers separately: four short dependency chains instead of two long ones.
         t = 2.0 * w - 1.0
         t2 = t * t
         scale, scale_odd = LOG_SCALE[DEGREE - 1], LOG_SCALE[DEGREE]

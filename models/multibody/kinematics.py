@@ -1,11 +1,11 @@
-"""Places and velocities of all segments from the generalised state of the tree."""
+"""Positions and velocities of all segments from the generalised state of the tree."""
 
 from models.compilation import inlined_kernel, kernel
 
 
 @inlined_kernel
 def _hang(tree, motion, i, p):
-    """Put the joint point of a segment, with its velocity, where its parent has it."""
+    """Set joint point and joint velocity of a segment to those of its position on the parent."""
     a0 = tree.joint_in_parent[i, 0]
     a1 = tree.joint_in_parent[i, 1]
     a2 = tree.joint_in_parent[i, 2]
@@ -38,7 +38,7 @@ def _hang(tree, motion, i, p):
 
 @inlined_kernel
 def update_kinematics(tree, motion):
-    """Fill rotations, centres, joints and centre velocities from the generalised state."""
+    """Compute rotations, centres, joints and centre velocities from the generalised state."""
     n = tree.mass.shape[0]
     for i in range(n):
         w, x, y, z = (
@@ -69,7 +69,7 @@ def update_kinematics(tree, motion):
                 motion.joint_velocity[i, k] = motion.root_velocity[k]
         else:
             if tree.yields[i]:
-                # The joint point is where its own motion has brought it.
+                # The joint point is part of the state.
                 for k in range(3):
                     motion.lever[i, k] = motion.joint[i, k] - motion.joint[p, k]
             else:
@@ -91,13 +91,13 @@ def update_kinematics(tree, motion):
 
 @kernel
 def seat_joints(tree, motion):
-    """Put the points of all joints that yield, with their velocities, where the parents have them.
+    """Set the points of all joints that yield, and their velocities, to zero stretch.
 
-    For a state that was given by the root and the segments' orientations; leaves the kinematics up
-    to date.
+    Used for a state that is given by the root and the segments' orientations; the kinematics are up
+    to date afterwards.
     """
     for i in range(tree.mass.shape[0]):
-        # Parents come before children: what hangs on a yielding joint follows it.
+        # Parents come before children: segments beyond a yielding joint follow it.
         update_kinematics(tree, motion)
         if tree.yields[i]:
             _hang(tree, motion, i, tree.parent[i])
@@ -106,7 +106,22 @@ def seat_joints(tree, motion):
 
 @inlined_kernel
 def centre_acceleration(motion, loads, i):
-    """Return the acceleration (x, y, z) in m/s2 of the centre of mass of segment ``i``."""
+    """Return the acceleration of the centre of mass of segment ``i``.
+
+    Parameters
+    ----------
+    motion : Motion
+        Positions and velocities of the segments.
+    loads : Loads
+        Joint and angular accelerations.
+    i : int
+        Row of the segment.
+
+    Returns
+    -------
+    ax, ay, az : float
+        World axes, m/s2.
+    """
     rx, ry, rz = motion.offset[i, 0], motion.offset[i, 1], motion.offset[i, 2]
     wx = motion.angular_velocity[i, 0]
     wy = motion.angular_velocity[i, 1]

@@ -24,7 +24,7 @@ _TABLE = data.load("multibody.toml")
 class MultibodyModel(CrashModel):
     """Fifteen ellipsoid segments with spherical joints against a braking car.
 
-    See ``CrashModel`` for its parameters.
+    See ``CrashModel`` for the parameters.
     """
 
     name = "multibody"
@@ -41,15 +41,18 @@ class MultibodyModel(CrashModel):
         return None if crash is None else self.follow(crash, values)
 
     def follow(self, crash: Crash, values: dict[str, float]) -> outcome.Raw:
-        """Return what the step loop leaves behind of an assembled crash, whose state it changes.
+        """Return the raw results of an assembled crash, whose state is changed.
 
         Parameters
         ----------
-        crash : as ``build_crash`` gives it. values : of all inputs, from which it was built.
+        crash : Crash
+            As returned by ``build_crash``.
+        values : mapping of str to float
+            All inputs from which it was built.
         """
         scenario = crash.scenario
         rate = joint_rate(crash.tree, scenario.joints, crash.motion)
-        # A light body with stiff joints takes a finer step than asked for.
+        # A light body with stiff joints needs a finer step than the one requested.
         tick = self.tick / max(1, math.ceil(rate * self.tick / STABLE))
         record = self._record
         if tick < self.tick:

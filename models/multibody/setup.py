@@ -1,4 +1,4 @@
-"""Assembly of a crash: the scenario as the tree of the compiled core, at first contact."""
+"""Assembly of a crash: the scenario as the tree of the compiled core at first contact."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +20,15 @@ from models.vehicle.profile import Vehicle
 
 @dataclass(frozen=True)
 class Crash:
-    """Everything that the step loop needs; ``motion`` is the state at first contact."""
+    """Input of the step loop.
+
+    Attributes
+    ----------
+    scenario : Scenario
+    tree : Tree
+    motion : Motion
+        State at first contact.
+    """
 
     scenario: Scenario
     tree: Tree
@@ -33,7 +41,8 @@ def build_tree(body: Body, yields: NDArray[np.bool_] | None = None) -> Tree:
     Parameters
     ----------
     body : Body
-    yields : (n,) which joints yield, as in ``Joints``; by default none.
+    yields : (n,) array of bool, optional
+        Joints that yield, as in ``Joints``; by default none.
     """
     n = len(SEGMENTS)
     reference = body.joint.copy()
@@ -75,10 +84,11 @@ def build_crash(
 
     Parameters
     ----------
-    inputs : mapping
+    inputs : mapping of str to float
         By name, in SI units; see ``data/multibody.toml``.
     vehicle : Vehicle
-    chain : effects that are switched on.
+    chain : EffectChain, optional
+        Effects that are switched on.
     """
     scenario = build_scenario(inputs, vehicle, chain)
     ellipsoids = scenario.ellipsoids

@@ -49,16 +49,26 @@ Array = NDArray[np.float64]
 
 
 class Settings(NamedTuple):
-    """How a run is stepped and recorded.
+    """Parameters of the step loop and of the recording.
 
     Attributes
     ----------
-    tick : s, the finest step. coarse, slide, flight : ticks that a step may take in quiet contact
-        with the car, on the road alone, and in free flight.
-    time_limit : s of crash. step_limit : steps.
-    frame_every : ticks between frames.
-    head : row of the head. trunk : highest row that counts as trunk.
-    mobility : (n,) 1/kg, as ``models.multibody.stability.surface_mobility`` gives it.
+    tick : float
+        Finest step, s.
+    coarse, slide, flight : int
+        Largest step in ticks in quiet contact with the car, on the road alone, and in free flight.
+    time_limit : float
+        Largest duration of a crash, s.
+    step_limit : int
+        Largest number of steps.
+    frame_every : int
+        Ticks between frames.
+    head : int
+        Row of the head.
+    trunk : int
+        Highest row that counts as trunk.
+    mobility : (n,) array
+        1/kg, see ``models.multibody.stability.surface_mobility``.
     """
 
     tick: float
@@ -74,14 +84,18 @@ class Settings(NamedTuple):
 
 
 class CoreModel(NamedTuple):
-    """What does not change in a run.
+    """Data that are constant during a run.
 
     Attributes
     ----------
-    tree, joints, ellipsoids : of the body.
-    front : geometry of the car's front, one of the types of ``models.crash.front``.
-    road, car_motion : of the surroundings.
-    settings : of the step loop.
+    tree : Tree
+    joints : Joints
+    ellipsoids : Ellipsoids
+    front : Zones
+        Geometry of the car's front, one of the types of ``models.crash.front``.
+    road : Road
+    car_motion : CarMotion
+    settings : Settings
     """
 
     tree: Tree
@@ -94,16 +108,31 @@ class CoreModel(NamedTuple):
 
 
 class CoreData(NamedTuple):
-    """State, loads, workspace and what is written down; all of it changes in a run.
+    """State, loads, workspace and recorded arrays, all changed during a run.
 
     Attributes
     ----------
-    motion, loads, contacts : of the body.
-    car : (6,) place, yaw and their rates; see ``models.vehicle.motion``.
-    power, old_power : (channels,) W on the body by channel, at both ends of a step.
-    memory : of the integrator. blow : the head's last one; see ``models.crash.record``.
-    work : (channels,) J on the body.
-    record : (rows, columns). frames : (rows, 4 + 7 n). head_contact, summary : entries.
+    motion : Motion
+    loads : Loads
+    contacts : Contacts
+    car : (6,) array
+        Position, yaw and their rates; see ``models.vehicle.motion``.
+    power, old_power : (channels,) array
+        Power on the body by channel at the end and the start of a step, W.
+    memory : Memory
+        Of the integrator.
+    blow : (entries,) array
+        The head's last impact on an arm; see ``models.crash.record.Blow``.
+    work : (channels,) array
+        Work on the body by channel, J.
+    record : (rows, columns) array
+        See ``models.crash.record.Column``.
+    frames : (rows, 4 + 7 n) array
+        See ``models.crash.record.Frame``.
+    head_contact : (entries,) array
+        See ``models.crash.record.HeadContact``.
+    summary : (entries,) array
+        See ``models.crash.record.Summary``.
     """
 
     motion: Motion
@@ -122,18 +151,18 @@ class CoreData(NamedTuple):
 
 
 def empty_data(motion: Motion, patches: int, pairs: int, record: Array, frames: Array) -> CoreData:
-    """Return the data of a run that begins from a motion.
+    """Return the data of a run that starts from a motion.
 
     Parameters
     ----------
     motion : Motion
         Changed in place.
     patches : int
-        Of the car's front.
+        Number of patches of the car's front.
     pairs : int
-        Of segments that can touch each other.
-    record, frames : arrays
-        To be filled.
+        Number of pairs of segments that can touch each other.
+    record, frames : array
+        Arrays to fill.
     """
     n = motion.orientation.shape[0]
     return CoreData(
@@ -155,7 +184,17 @@ def empty_data(motion: Motion, patches: int, pairs: int, record: Array, frames: 
 
 @inlined_kernel
 def total_energy(tree, motion, road):
-    """Return kinetic plus gravitational energy (J) of the tree."""
+    """Return kinetic plus gravitational energy (J) of the tree.
+
+    Parameters
+    ----------
+    tree : Tree
+        Constant data of the segments.
+    motion : Motion
+        Positions and velocities of the segments.
+    road : Road
+        Gives the gravity components.
+    """
     energy = 0.0
     for i in range(tree.mass.shape[0]):
         m = tree.mass[i]
@@ -174,7 +213,7 @@ def total_energy(tree, motion, road):
 
 @inlined_kernel
 def evaluate(model, data):
-    """Fill loads and accelerations for the present state, and the powers (W) of all channels."""
+    """Compute loads, accelerations and the power (W) of all channels for the present state."""
     tree, motion, loads, contacts = model.tree, data.motion, data.loads, data.contacts
     power, road = data.power, model.road
     for k in range(CHANNELS):
@@ -202,7 +241,18 @@ def evaluate(model, data):
 
 @inlined_kernel
 def step(model, data, time, length):
-    """Advance the state by a step of ``length`` (s) that ends at ``time`` (s)."""
+    """Advance the state by one step.
+
+    Parameters
+    ----------
+    model : CoreModel
+    data : CoreData
+        Changed in place.
+    time : float
+        End of the step, s.
+    length : float
+        Length of the step, s.
+    """
     for k in range(CHANNELS):
         data.old_power[k] = data.power[k]
     predict(model.tree, data.motion, data.loads, data.memory, length)
@@ -215,10 +265,10 @@ def step(model, data, time, length):
 
 @inlined_kernel
 def _ticks_of_next_step(model, data):
-    """Return how many ticks the next step may take.
+    """Return the number of ticks of the next step.
 
-    One while the head is fast near the car or meets the road; the settings say how many in free
-    flight and otherwise.
+    One while the head is fast near the car or meets the road; otherwise the numbers of the settings
+    for the kind of contact, limited by stability.
     """
     settings, ellipsoids = model.settings, model.ellipsoids
     motion, contacts = data.motion, data.contacts
@@ -230,7 +280,7 @@ def _ticks_of_next_step(model, data):
     ahead = 2.0 * settings.flight * settings.tick
     if contacts.segment_force[head, road] > HEAD_FORCE:
         return 1
-    # The exact gap of the head as it lies.
+    # The exact gap of the head in its present orientation.
     gap = contacts.centre[head, 2] - math.sqrt(contacts.shape[head, 5])
     if fall > HEAD_FALL and gap < ahead * fall + 1e-3:
         return 1
@@ -267,7 +317,7 @@ def _write_record(row, time, model, data):
 
 @inlined_kernel
 def _note_landing(time, settings, contacts, summary):
-    """Note when trunk or head first meet the road."""
+    """Record the time at which trunk or head first touches the road."""
     road = contacts.zone_force.shape[0] - 1
     if summary[Summary.GROUND_TIME] == math.inf:
         for i in range(settings.trunk + 1):

@@ -1,4 +1,4 @@
-"""How long a step may be: the fastest thing that the joints of a body do."""
+"""Stable step lengths, from the fastest rates of joints and contacts."""
 
 import math
 
@@ -26,27 +26,55 @@ SWEEPS = 30
 
 
 def joint_rate(tree: Tree, joints: Joints, motion: Motion) -> float:
-    """Return the largest rate (1/s) of the joints: ``STABLE`` over it is the longest step.
+    """Return the largest rate (1/s) of the joints; the longest stable step is ``STABLE`` over it.
 
-    Of their damping and of their bushings, a bushing's frequency counting as ``STABLE / RESOLVED``.
+    It is the maximum over damping and bushings; a bushing's frequency is weighted by
+    ``STABLE / RESOLVED``.
 
     Parameters
     ----------
-    tree, joints : of a body. motion : a posture of it, its kinematics up to date.
+    tree : Tree
+        Constant data of the segments.
+    joints : Joints
+        Joints of the body.
+    motion : Motion
+        Posture of the body, with its kinematics up to date.
     """
     return max(_damping_rate(tree, joints, motion), _bushing_rate(tree, joints))
 
 
 def stable_ticks(rate: float, tick: float, wanted: int) -> int:
-    """Return how many ticks, one to ``wanted``, a step may take with a joint rate (1/s)."""
+    """Return the number of ticks, one to ``wanted``, that a step may take at a joint rate.
+
+    Parameters
+    ----------
+    rate : float
+        Largest rate of the joints, 1/s.
+    tick : float
+        Finest step, s.
+    wanted : int
+        Largest number of ticks.
+    """
     return min(wanted, max(1, int(STABLE / (rate * tick))))
 
 
 def surface_mobility(tree: Tree, semi_axes: Array) -> Array:
-    """Return the acceleration (n,) 1/kg of each segment's surface per unit force on it.
+    """Return the acceleration of each segment's surface per unit force on it.
 
-    Of the free segment, at half of its longest semi-axis from its centre of mass (assumed: bodies
-    lie on the road along their length).
+    The segment is free and the point lies at half of its longest semi-axis from its centre of mass
+    (assumed: bodies lie on the road along their length).
+
+    Parameters
+    ----------
+    tree : Tree
+        Constant data of the segments.
+    semi_axes : (n, 3) array
+        m.
+
+    Returns
+    -------
+    (n,) array
+        1/kg.
     """
     longest = np.argmax(semi_axes, axis=1)
     arms = np.zeros_like(semi_axes)
@@ -57,9 +85,21 @@ def surface_mobility(tree: Tree, semi_axes: Array) -> Array:
 
 @inlined_kernel
 def ticks_in_contact(settings, ellipsoids, contacts, wanted):
-    """Return how many ticks, one to ``wanted``, a step may take with what is in contact now.
+    """Return the number of ticks, one to ``wanted``, that a step may take in the present contacts.
 
-    The stiffness of a contact is that of its unloading, its mass what the free segments put there.
+    The stiffness of a contact is that of its unloading, its mass that of the free segments at the
+    contact point.
+
+    Parameters
+    ----------
+    settings : Settings
+        Gives ``tick`` and ``mobility``.
+    ellipsoids : Ellipsoids
+        Surfaces of the segments and their contact laws.
+    contacts : Contacts
+        State and results of the contacts.
+    wanted : int
+        Largest number of ticks.
     """
     fastest = 0.0
     for i in range(contacts.centre.shape[0]):
@@ -84,7 +124,7 @@ def ticks_in_contact(settings, ellipsoids, contacts, wanted):
 
 @inlined_kernel
 def _unloading(ellipsoids, law, deepest):
-    """Return the unloading slope (N/m) of a combined law from its deepest penetration (m)."""
+    """Return the unloading slope (N/m) of a combined law from its largest penetration (m)."""
     count = ellipsoids.counts[law]
     top = interpolate_law(ellipsoids.laws, law, count, FORCE, deepest)
     return top / interpolate_law(ellipsoids.laws, law, count, RECOVERY, deepest)
@@ -93,8 +133,8 @@ def _unloading(ellipsoids, law, deepest):
 def _damping_rate(tree: Tree, joints: Joints, motion: Motion) -> float:
     """Return the largest rotational damping rate (1/s) of the body as a whole.
 
-    Of relative accelerations of all joints under the torques of all dampers: the largest eigenvalue
-    of damping times mobility, friction counted at its steepest, by power iteration.
+    It is the largest eigenvalue of damping times mobility (relative accelerations of all joints per
+    joint torque), with friction at its steepest, by power iteration.
     """
     n = tree.mass.size
     mobility = np.zeros((3 * n, 3 * n))
@@ -109,7 +149,7 @@ def _damping_rate(tree: Tree, joints: Joints, motion: Motion) -> float:
 
 @kernel
 def _largest_eigenvalue(matrix, vector, turned):
-    """Return the largest eigenvalue of a symmetric matrix, by power iteration from a vector."""
+    """Return the largest eigenvalue of a symmetric matrix by power iteration."""
     n = vector.size
     rate = 0.0
     for sweep in range(SWEEPS + 1):
@@ -154,9 +194,9 @@ def _fill_mobility(tree, motion, loads, mobility):
 
 
 def _bushing_rate(tree: Tree, joints: Joints) -> float:
-    """Return the largest rate (1/s) of a joint that yields, by its damping and its frequency.
+    """Return the largest rate (1/s) of a joint that yields, from its damping and its frequency.
 
-    By the mass that two segments, free of all others, put against each other at the joint point.
+    The mass is the effective mass of the two segments, free of all others, at the joint point.
     """
     rows = np.flatnonzero(tree.yields)
     if not rows.size:
@@ -172,13 +212,15 @@ def _bushing_rate(tree: Tree, joints: Joints) -> float:
 
 
 def _mobility(tree: Tree, rows: NDArray[np.int64], arms: Array) -> Array:
-    """Return the largest acceleration (k,) 1/kg of points of free segments per unit force at them.
+    """Return the largest acceleration (k,) of points of free segments per unit force at them, 1/kg.
 
     Parameters
     ----------
     tree : Tree
-    rows : (k,) segments.
-    arms : (k, 3) m, of the points from the centres of mass.
+    rows : (k,) array
+        Segments.
+    arms : (k, 3) array
+        Positions of the points from the centres of mass, m.
     """
     x, y, z = arms.T
     none = np.zeros_like(x)

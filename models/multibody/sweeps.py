@@ -1,29 +1,29 @@
 """Exact dynamics of a tree of rigid segments with spherical joints, in two sweeps.
 
-With absolute orientations and joints that leave all rotation free, the torque that a joint
-carries is known (it is the joint's resistance), so a subtree acts on its parent only by a force at
-the joint point. That force is linear in the acceleration of the point: the subtree is a 3x3
-*articulated mass* there. One sweep from the leaves to the root gathers these masses, one sweep
-back gives all accelerations. This is Featherstone's articulated-body recursion (R. Featherstone,
-Rigid Body Dynamics Algorithms, 2008, chapter 7) for the case in which the joint's motion subspace
-is the whole of rotation; no large system is solved and no joint drifts.
+With absolute orientations and joints that leave all rotation free, the torque of a joint is known
+(it is the joint's resistance), so a subtree acts on its parent only by a force at the joint point.
+That force is linear in the acceleration of the point: the subtree is a 3x3 *articulated mass*
+there. One sweep from the leaves to the root accumulates these masses, a second sweep back gives all
+accelerations. This is Featherstone's articulated-body recursion (R. Featherstone, Rigid Body
+Dynamics Algorithms, 2008, chapter 7) for the case in which the joint's motion subspace is the whole
+of rotation; no large system is solved and no joint drifts.
 
 For a segment with joint point J, mass m, centre of mass at r from J, inertia I about the centre
-of mass, children c hanging at d_c with articulated masses M_c and bias forces b_c::
+of mass, children c attached at d_c with articulated masses M_c and bias forces b_c::
 
     f = M a_J - K alpha + p          force that the parent applies at J
     n = -K^T a_J + G alpha + s       torque that the joint applies
 
     M = m 1 + sum M_c     K = m [r] + sum M_c [d_c]     G = I - m [r][r] - sum [d_c] M_c [d_c]
 
-where ``[r]`` is the cross-product matrix. Eliminating alpha leaves the segment's own articulated
+where ``[r]`` is the cross-product matrix. Eliminating alpha gives the segment's own articulated
 mass ``M - K G^-1 K^T`` and bias ``p + K G^-1 (s - n)``.
 
 A joint that yields carries a force that is known from the stretch between its points (see
-``models.multibody.bushings``), as its torque is. Its child is then a second root: the articulated
-mass gives the joint point's acceleration at once, ``M a_J + b = f``, and the parent feels the force
-and the torque but no mass. So a compliant joint costs less than an exact one, and as its stiffness
-grows the motion tends to that of the exact joint.
+``models.multibody.bushings``), like its torque. Its child is then a second root: the articulated
+mass gives the joint point's acceleration directly, ``M a_J + b = f``, and the force and the torque
+act on the parent, but no mass. A compliant joint therefore costs less than an exact one, and as its
+stiffness grows the motion tends to that of the exact joint.
 """
 
 from models.compilation import inlined_kernel
@@ -31,7 +31,17 @@ from models.compilation import inlined_kernel
 
 @inlined_kernel
 def solve_accelerations(tree, motion, loads):
-    """Fill ``joint_acceleration`` and ``angular_acceleration`` from loads and motion."""
+    """Compute the accelerations of all segments from loads and motion.
+
+    Parameters
+    ----------
+    tree : Tree
+        Constant data of the segments.
+    motion : Motion
+        Positions and velocities of the segments.
+    loads : Loads
+        ``joint_acceleration`` and ``angular_acceleration`` are filled; workspace is overwritten.
+    """
     _sweep_to_root(tree, motion, loads)
     _sweep_to_leaves(tree, motion, loads)
 
@@ -150,7 +160,7 @@ def _sweep_to_root(tree, motion, loads):
         by = py - (X10 * nx + X11 * ny + X12 * nz)
         bz = pz - (X20 * nx + X21 * ny + X22 * nz)
         if parent < 0 or tree.yields[i]:
-            # The force at the joint is known: nothing at the root, its bushing's where it yields.
+            # The force at the joint is known: zero at the root, the bushing's where it yields.
             bx -= loads.joint_force[i, 0]
             by -= loads.joint_force[i, 1]
             bz -= loads.joint_force[i, 2]
@@ -212,7 +222,7 @@ def _sweep_to_root(tree, motion, loads):
 
 @inlined_kernel
 def _react(motion, loads, i, parent):
-    """Add what a joint that yields demands of the parent: its force and torque, no mass."""
+    """Add the force and the torque of a joint that yields, but no mass, to its parent."""
     dx, dy, dz = motion.lever[i, 0], motion.lever[i, 1], motion.lever[i, 2]
     fx, fy, fz = loads.joint_force[i, 0], loads.joint_force[i, 1], loads.joint_force[i, 2]
     loads.articulated[parent, 21] += fx

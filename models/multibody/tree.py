@@ -13,13 +13,19 @@ class Tree(NamedTuple):
 
     Attributes
     ----------
-    parent : (n,) int64, -1 for the root.
-    joint_in_parent : (n, 3) m, inboard joint from the parent's own inboard joint, parent axes.
-    centre_from_joint : (n, 3) m, own centre of mass from the inboard joint, own axes; 0 for the
-        root, whose reference point is its centre of mass.
-    mass : (n,) kg.
-    inertia : (n, 3) kg m2, principal moments along the own axes, about the centre of mass.
-    yields : (n,) whether the inboard joint lets its two points part (root: False).
+    parent : (n,) array of int64
+        Row of the parent, -1 for the root.
+    joint_in_parent : (n, 3) array
+        Inboard joint from the parent's own inboard joint, parent axes, m.
+    centre_from_joint : (n, 3) array
+        Own centre of mass from the inboard joint, own axes, m; 0 for the root, whose reference
+        point is its centre of mass.
+    mass : (n,) array
+        kg.
+    inertia : (n, 3) array
+        Principal moments along the own axes about the centre of mass, kg m2.
+    yields : (n,) array of bool
+        Whether the two points of the inboard joint can separate (root: False).
     """
 
     parent: NDArray[np.int64]
@@ -35,14 +41,23 @@ class Motion(NamedTuple):
 
     Attributes
     ----------
-    root_position, root_velocity : (3,) m, m/s, the root's centre of mass.
-    orientation : (n, 4) unit quaternions.
-    angular_velocity : (n, 3) rad/s.
-    rotation : (n, 3, 3) rotation matrices of ``orientation``.
-    centre, velocity : (n, 3) centre of mass and its velocity.
-    joint, joint_velocity : (n, 3) joint point on the segment and its velocity; of a joint that
-        yields they are part of the state.
-    lever, offset : (n, 3) parent's joint to own joint, own joint to own centre.
+    root_position, root_velocity : (3,) array
+        The root's centre of mass, m and m/s.
+    orientation : (n, 4) array
+        Unit quaternions.
+    angular_velocity : (n, 3) array
+        rad/s.
+    rotation : (n, 3, 3) array
+        Rotation matrices of ``orientation``.
+    centre, velocity : (n, 3) array
+        Centre of mass and its velocity, m and m/s.
+    joint, joint_velocity : (n, 3) array
+        Joint point on the segment and its velocity, m and m/s; part of the state for a joint that
+        yields.
+    lever : (n, 3) array
+        Own joint from the parent's joint, m.
+    offset : (n, 3) array
+        Own centre of mass from the own joint, m.
     """
 
     root_position: Array
@@ -59,19 +74,29 @@ class Motion(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """What acts on the segments, and what comes of it, in world axes.
+    """Loads on the segments and the resulting accelerations, in world axes.
 
     Attributes
     ----------
-    force, torque : (n, 3) N, N m, external load about the centre of mass.
-    joint_torque : (n, 3) N m, torque of the inboard joint on the segment (its parent feels the
-        opposite); ignored for the root.
-    joint_force : (n, 3) N, force of an inboard joint that yields on the segment, at its joint
-        point (its parent feels the opposite, there); 0 for the root.
-    joint_acceleration : (n, 3) m/s2, acceleration of the joint point (root: centre of mass).
-    angular_acceleration : (n, 3) rad/s2.
-    articulated : (n, 27) workspace: what the children add to M, K, G, p and s.
-    gain, free_spin : (n, 3, 3), (n, 3) workspace: alpha = free_spin + gain^T a_J.
+    force, torque : (n, 3) array
+        External load about the centre of mass, N and N m.
+    joint_torque : (n, 3) array
+        Torque of the inboard joint on the segment, N m (the opposite acts on its parent); ignored
+        for the root.
+    joint_force : (n, 3) array
+        Force of an inboard joint that yields on the segment, at its joint point, N (the opposite
+        acts on its parent at the same point); 0 for the root.
+    joint_acceleration : (n, 3) array
+        Acceleration of the joint point (root: centre of mass), m/s2.
+    angular_acceleration : (n, 3) array
+        rad/s2.
+    articulated : (n, 27) array
+        Workspace: articulated-inertia accumulators, contributions of the children to M, K, G, p
+        and s.
+    gain : (n, 3, 3) array
+        Workspace of ``alpha = free_spin + gain^T a_J``.
+    free_spin : (n, 3) array
+        Workspace, as above.
     """
 
     force: Array

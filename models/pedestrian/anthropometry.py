@@ -2,9 +2,9 @@
 
 Proportions (mass shares, semi-axes and joint heights over stature) are interpolated in age between
 the reference bodies of ``data/pedestrians/segments.toml`` and held constant outside them. Lengths
-then follow stature, the two transverse semi-axes follow sqrt(mass / stature), so that density stays
-near that of the reference; a head mass given by hand is taken from or added to the head alone and
-the rest of the body is scaled to keep the total.
+are proportional to stature, the two transverse semi-axes to sqrt(mass / stature), so that density
+stays near that of the reference. A given head mass changes the head alone, and the rest of the body
+is scaled to keep the total.
 """
 
 import functools
@@ -52,21 +52,43 @@ def region_of(segment: str) -> str:
 
 
 def is_possible(stature: float, body_mass: float, head_mass: float) -> bool:
-    """Return whether a body of this stature (m), mass and head mass (kg) can exist."""
+    """Return whether a body of these dimensions can exist.
+
+    Parameters
+    ----------
+    stature : float
+        m.
+    body_mass, head_mass : float
+        kg.
+    """
     low, high = BODY_MASS_INDEX
     return head_mass < LARGEST_HEAD_SHARE * body_mass and low <= body_mass / stature**2 <= high
 
 
 @dataclass(frozen=True)
 class Body:
-    """A standing pedestrian; rows follow ``SEGMENTS``, lengths in m from the soles' midpoint.
+    """A standing pedestrian; rows follow ``SEGMENTS``, positions from the soles' midpoint.
 
     Attributes
     ----------
-    age, stature, body_mass : years, m, kg.
-    mass : (15,) kg. inertia : (15, 3) kg m2, principal, about the centre of mass.
-    semi_axes : (15, 3) m. centre : (15, 3) m, centres of mass. ellipsoid : (15, 3) m, centres of
-        the ellipsoids. joint : (15, 3) m, joints to the parents.
+    age : float
+        Years.
+    stature : float
+        m.
+    body_mass : float
+        kg.
+    mass : (15,) array
+        kg.
+    inertia : (15, 3) array
+        Principal moments about the centre of mass, kg m2.
+    semi_axes : (15, 3) array
+        m.
+    centre : (15, 3) array
+        Centres of mass, m.
+    ellipsoid : (15, 3) array
+        Centres of the ellipsoids, m.
+    joint : (15, 3) array
+        Joints to the parents, m.
     """
 
     age: float
@@ -91,7 +113,7 @@ class _Proportions:
 
 
 def _axis_scale(stature: float, body_mass: float) -> Array:
-    """Return what semi-axes are proportional to: stature along a segment, build across it."""
+    """Return the scale of the semi-axes: stature along a segment, build across it."""
     scale = np.empty((len(SEGMENTS), 3))
     scale[:, :2] = np.sqrt(body_mass / stature)
     scale[:, 2] = stature
@@ -133,11 +155,11 @@ def build_body(
     Parameters
     ----------
     age : float
-        Years; chooses the proportions, from the 7-year-old's to the adult's.
+        Years; selects the proportions, from the 7-year-old's to the adult's.
     stature, body_mass : float
         m and kg.
     head_mass : float, optional
-        kg; by default the share that goes with the age.
+        kg; by default the share of the body mass at that age.
 
     Raises
     ------

@@ -23,7 +23,19 @@ def _chart(sex: str) -> NDArray[np.float64]:
 
 
 def parameters(quantity: str, age: float, sex: str = "boy") -> tuple[float, float, float]:
-    """Return L, M, S of ``"stature"`` (M in m) or ``"body_mass"`` (M in kg) at an age in years.
+    """Return L, M, S of a quantity at an age.
+
+    Parameters
+    ----------
+    quantity : {"stature", "body_mass"}
+    age : float
+        Years.
+    sex : {"boy", "girl"}
+
+    Returns
+    -------
+    L, M, S : float
+        M in m or kg.
 
     Raises
     ------
@@ -45,6 +57,16 @@ def parameters(quantity: str, age: float, sex: str = "boy") -> tuple[float, floa
 
 
 def value_at(quantity: str, age: float, z: float = 0.0, sex: str = "boy") -> float:
-    """Return the stature (m) or body mass (kg) ``z`` standard deviations from the median."""
+    """Return the stature (m) or body mass (kg) at an age and standard score.
+
+    Parameters
+    ----------
+    quantity : {"stature", "body_mass"}
+    age : float
+        Years.
+    z : float
+        Standard score; 0 is the median.
+    sex : {"boy", "girl"}
+    """
     L, M, S = parameters(quantity, age, sex)
     return M * math.exp(S * z) if L == 0.0 else float(M * (1.0 + L * S * z) ** (1.0 / L))

@@ -24,18 +24,30 @@ class Joints(NamedTuple):
 
     Attributes
     ----------
-    centre : (n, 4) quaternion of the child relative to its parent at the centre of the range.
-    half_range : (n, 3) rad, half width of the range.
-    neutral : (n, 3) rad, where the passive stiffness is at rest, from the centre.
-    stiffness_low, stiffness_high : (n, 3) N m/rad, passive, on either side of the neutral value.
-    stop_low, stop_high : (n, 3) N m/rad, beyond the range.
-    damping : (n, 3) N m s/rad.
-    friction : (n,) N m.
-    onset : (n,) rad, over which the stops fade in.
-    yields : (n,) whether the joint's two points can part.
-    give_low, give_high : (n, 3) N/m, stiffness against their parting in either direction of the
-        parent's axes. give_damping : (n, 3) N s/m. give_range : (n,) m, either way, beyond which
-        the points hardly part further.
+    centre : (n, 4) array
+        Quaternion of the child relative to its parent at the centre of the range.
+    half_range : (n, 3) array
+        Half width of the range, rad.
+    neutral : (n, 3) array
+        Rotation from the centre at which the passive stiffness has no torque, rad.
+    stiffness_low, stiffness_high : (n, 3) array
+        Passive stiffness on either side of the neutral value, N m/rad.
+    stop_low, stop_high : (n, 3) array
+        Stiffness beyond the range, N m/rad.
+    damping : (n, 3) array
+        N m s/rad.
+    friction : (n,) array
+        N m.
+    onset : (n,) array
+        Rotation over which the stops taper in, rad.
+    yields : (n,) array of bool
+        Whether the joint's two points can separate.
+    give_low, give_high : (n, 3) array
+        Stiffness against separation in either direction of the parent's axes, N/m.
+    give_damping : (n, 3) array
+        N s/m.
+    give_range : (n,) array
+        Separation in either direction beyond which the stiffness is higher, m.
     """
 
     centre: Array
@@ -73,16 +85,16 @@ def build_joints(
     muscle_tone : float
         Factor on joint friction; 1 is the setting in which a joint just holds its limb.
     neck_tension_stiffness : float
-        Factor on the stiffness of the neck against being stretched.
+        Factor on the tensile stiffness of the neck.
     shoulder_stiffness : float
-        Factor on the stiffness of the shoulder girdle, its damping following by the square root.
+        Factor on the stiffness of the shoulder girdle; its damping scales with the square root.
     """
     reference = data.load("pedestrians/segments.toml")["child_7y"]
     scale = scale_between(body.stature, body.age, reference["stature"], reference["age"])
     base = _reference_joints()
     factor = np.where(_NECK_ROWS, neck_stiffness, 1.0)[:, None]
     moment = scale.moment * factor
-    # Friction holds the limb's weight: it follows mass times length, not tissue.
+    # Friction holds the limb's weight: it scales with mass times length, not with tissue.
     weight = body.body_mass * body.stature / (reference["body_mass"] * reference["stature"])
     joints = base._replace(
         stiffness_low=base.stiffness_low * moment,
@@ -109,7 +121,7 @@ _NECK_ROWS = np.array([region_of(segment) in NECK_JOINTS for segment in SEGMENTS
 
 @functools.cache
 def _reference_joints() -> Joints:
-    """Return the joints of the 7-year-old as the data file has them."""
+    """Return the joints of the 7-year-old from the data file."""
     table = data.load("pedestrians/joints.toml")
     n = len(SEGMENTS)
     joints = Joints(
@@ -158,7 +170,7 @@ def _reference_joints() -> Joints:
 
 
 def _let_yield(joints: Joints, i: int, row: dict[str, Any], *, mirrored: bool) -> None:
-    """Let the points of a joint part against the springs and dampers of its table."""
+    """Set the springs and dampers of a joint that yields from its table."""
     joints.yields[i] = True
     for k, axis in enumerate("xyz"):
         low, high = row["stiffness"][axis]
@@ -176,11 +188,23 @@ def joints_of(joints: Joints, rows: list[int]) -> Joints:
 
 
 def elastic_energy(joints: Joints, joint: int, vector: Array) -> Array:
-    """Return the elastic energy (k,) in J of a joint at rotation vectors (k, 3) in rad.
+    """Return the elastic energy of a joint at rotation vectors.
 
-    The vectors are those of the child from the centre of its range. Passive stiffness about the
-    neutral values, and stops that fade in beyond the range; the torque that follows is in
-    ``models.multibody.joints``.
+    It contains the passive stiffness about the neutral values, and stops that taper in beyond the
+    range; the resulting torque is in ``models.multibody.joints``.
+
+    Parameters
+    ----------
+    joints : Joints
+    joint : int
+        Row of the joint.
+    vector : (k, 3) array
+        Rotation vectors of the child from the centre of its range, rad.
+
+    Returns
+    -------
+    (k,) array
+        J.
     """
     rest = vector - joints.neutral[joint]
     stiffness = np.where(rest > 0.0, joints.stiffness_high[joint], joints.stiffness_low[joint])

@@ -1,4 +1,4 @@
-"""Running posture: where every segment is, and how fast it turns, at a phase of the gait."""
+"""Running posture: position and angular velocity of every segment at a phase of the gait."""
 
 import functools
 import math
@@ -14,7 +14,7 @@ from models.rotation import axis_rotation, matrix_of, multiply
 
 Array = NDArray[np.float64]
 
-# Sign of flexion about +y, which tips the upper end of a segment forwards.
+# Sign of flexion about +y, which tilts the upper end of a segment forwards.
 _FLEXION = {"thigh": -1.0, "shank": 1.0, "foot": -1.0, "upper_arm": -1.0, "forearm": -1.0}
 
 _JOINT = {
@@ -32,9 +32,12 @@ class Posture:
 
     Attributes
     ----------
-    root_position, root_velocity : (3,) m and m/s, centre of mass of the hip segment; the lowest
-        point of the body is on the road.
-    orientation : (15, 4) quaternions. angular_velocity : (15, 3) rad/s.
+    root_position, root_velocity : (3,) array
+        Centre of mass of the hip segment, m and m/s; the lowest point of the body is on the road.
+    orientation : (15, 4) array
+        Quaternions.
+    angular_velocity : (15, 3) array
+        rad/s.
     """
 
     root_position: Array
@@ -127,11 +130,11 @@ def running_posture(
     gait_phase : float
         0 to 1 since the left foot's strike; the right leg is half a cycle behind.
     facing_angle : float
-        rad, direction of running from x (the car's travel) towards y (its left).
+        Direction of running from x (the car's travel) towards y (its left), rad.
     running_speed : float
         m/s.
     braced : float
-        Share of the way from running to a braced stance (0 to 1), whose limbs do not swing.
+        Interpolation share between running (0) and a braced stance (1) whose limbs do not swing.
     """
     lean = math.radians(data.load("gait/running.toml")["trunk_lean"])
     frequency = cycle_frequency(running_speed, body.stature)
@@ -152,7 +155,7 @@ def running_posture(
             pitch[i] += _FLEXION[region] * angle
             rate[i] += _FLEXION[region] * per_cycle * frequency
         elif region in ("neck", "head"):
-            # The two neck joints share the work of keeping the face upright.
+            # The two neck joints each take half of the rotation that keeps the face upright.
             pitch[i] -= 0.5 * lean
     heading = axis_rotation(2, facing_angle)
     leaning = np.array([axis_rotation(1, angle) for angle in pitch.tolist()])
@@ -164,7 +167,21 @@ def running_posture(
 
 
 def segment_centres(body: Body, orientation: Array, root_position: Array) -> Array:
-    """Return the (15, 3) centres of mass for segment orientations and a root position."""
+    """Return the centres of mass of the segments.
+
+    Parameters
+    ----------
+    body : Body
+    orientation : (15, 4) array
+        Quaternions of the segments.
+    root_position : (3,) array
+        Centre of mass of the hip segment, m.
+
+    Returns
+    -------
+    (15, 3) array
+        World axes, m.
+    """
     return _centres(body, np.array([matrix_of(q) for q in orientation]), root_position)
 
 

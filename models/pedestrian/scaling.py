@@ -28,7 +28,15 @@ between these values and 1."""
 
 @dataclass(frozen=True)
 class Scale:
-    """Ratios of a body to its reference: ``length`` and ``modulus``."""
+    """Ratios of a body to its reference.
+
+    Attributes
+    ----------
+    length : float
+        Ratio of lengths.
+    modulus : float
+        Ratio of elastic moduli.
+    """
 
     length: float
     modulus: float = 1.0
@@ -65,5 +73,13 @@ def modulus_ratio(age: float) -> float:
 
 
 def scale_between(stature: float, age: float, from_stature: float, from_age: float) -> Scale:
-    """Return the scale from one body to another (m and years)."""
+    """Return the scale from one body to another.
+
+    Parameters
+    ----------
+    stature, from_stature : float
+        Stature of the body and of the reference, m.
+    age, from_age : float
+        Age of the body and of the reference, years.
+    """
     return Scale(stature / from_stature, modulus_ratio(age) / modulus_ratio(from_age))

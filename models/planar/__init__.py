@@ -1,1 +1,1 @@
-"""The planar crash model: the body held in the plane of the car's travel, stepped by Pymunk."""
+"""The planar crash model: the body restricted to the plane of the car's travel, with Pymunk."""

@@ -1,8 +1,8 @@
-"""The three-dimensional body held in the plane of the car's travel.
+"""The three-dimensional body restricted to the plane of the car's travel.
 
-Every segment keeps its place and posture at first contact and may from then on move along x and z
-and turn about y alone. Masses, joints and ellipsoids are thus those of the spatial body; only its
-motion across the plane is taken away. Angles are Pymunk's: from x towards z, zero at the start.
+Every segment keeps its lateral position and posture of first contact and then only moves along x
+and z and rotates about y. Masses, joints and ellipsoids are those of the spatial body; only its
+motion across the plane is removed. Angles follow Pymunk: from x towards z, zero at the start.
 """
 
 import math
@@ -22,21 +22,41 @@ Index = NDArray[np.int64]
 
 
 class PlanarBody(NamedTuple):
-    """Constant data and start of ``n`` segments in the plane.
+    """Constant data and initial state of ``n`` segments in the plane.
 
     Attributes
     ----------
-    parent : (n,). mass : (n,) kg. inertia : (n,) kg m2 about y through the centre of mass.
-    normal : (n, 3) the plane's normal y in the segment's own axes, the same at all times.
-    shadow : (n, 3) m2, shape entries xx, xz, zz of the ellipsoid's shadow at the start.
-    offset : (n, 2) m, ellipsoid's centre from the centre of mass at the start.
-    breadth : (n, 2) m, lowest and highest y of the ellipsoid.
-    side : (n,) m, y of the ellipsoid's centre. orientation : (n, 4) quaternions at the start.
-    centre : (n, 2) m. velocity : (n, 2) m/s. spin : (n,) rad/s.
-    joint : (n, 2) m, joint to the parent (root: its centre).
-    axes : (n, 3, 2) the segment's own axes at the start, their parts in the plane.
-    mobility : (n,) 1/kg, largest acceleration of the joint's two points against each other per unit
-        force between them, both segments free.
+    parent : (n,) array of int64
+        Row of the parent, -1 for the root.
+    mass : (n,) array
+        kg.
+    inertia : (n,) array
+        About y through the centre of mass, kg m2.
+    normal : (n, 3) array
+        The plane's normal y in the segment's own axes, constant.
+    shadow : (n, 3) array
+        Shape entries xx, xz, zz of the ellipsoid's projection onto the plane at the start, m2.
+    offset : (n, 2) array
+        Ellipsoid's centre from the centre of mass at the start, m.
+    breadth : (n, 2) array
+        Lowest and highest y of the ellipsoid, m.
+    side : (n,) array
+        y of the ellipsoid's centre, m.
+    orientation : (n, 4) array
+        Quaternions at the start.
+    centre : (n, 2) array
+        m.
+    velocity : (n, 2) array
+        m/s.
+    spin : (n,) array
+        rad/s.
+    joint : (n, 2) array
+        Joint to the parent (root: its centre), m.
+    axes : (n, 3, 2) array
+        In-plane components of the segment's own axes at the start.
+    mobility : (n,) array
+        Largest relative acceleration of the joint's two points per unit force between them, both
+        segments free, 1/kg.
     """
 
     parent: Index
@@ -57,7 +77,7 @@ class PlanarBody(NamedTuple):
 
 
 def hold_in_plane(body: Body, posture: Posture) -> PlanarBody:
-    """Return a body in a posture, held in the plane."""
+    """Return a body in a posture, restricted to the plane."""
     n = len(SEGMENTS)
     rotation = np.array([matrix_of(q) for q in posture.orientation])
     normal = rotation[:, 1, :].copy()
@@ -67,7 +87,7 @@ def hold_in_plane(body: Body, posture: Posture) -> PlanarBody:
     half = np.sqrt(shape[:, 1, 1])
     middle = centre[:, 1] + offset[:, 1]
     joint, velocity = centre[:, ::2].copy(), np.empty((n, 2))
-    # Of a turning segment only the turn about y is kept; y turns z towards x.
+    # Only the rotation about y is kept; a positive one rotates z towards x.
     spin = -posture.angular_velocity[:, 1]
     velocity[0] = posture.root_velocity[::2]
     for i, parent in enumerate(PARENTS):
@@ -108,12 +128,16 @@ def surfaces_in_plane(
 ) -> Ellipsoids:
     """Return the surfaces of a body in the plane: which segments meet the car and each other.
 
-    Of two segments that are apart across the plane the shadows pass through each other.
+    Two segments that are apart across the plane do not touch: their projections pass through each
+    other.
 
     Parameters
     ----------
-    ellipsoids : of the spatial body. body : in the plane.
-    free : regions that pass through the car and through other segments.
+    ellipsoids : Ellipsoids
+        Of the spatial body.
+    body : PlanarBody
+    free : collection of str
+        Regions that pass through the car and through other segments.
     """
     loose = np.array([region_of(segment) in free for segment in SEGMENTS])
     law = ellipsoids.surface_law.copy()
@@ -128,9 +152,22 @@ def surfaces_in_plane(
 
 
 def outline(body: PlanarBody, segment: int, corners: int) -> list[tuple[float, float]]:
-    """Return the corners (m) of a polygon along a segment's shadow, from its centre of mass.
+    """Return the corners of a polygon that approximates a segment's projection.
 
     Its corners lie outside the ellipse by as much as its sides lie inside.
+
+    Parameters
+    ----------
+    body : PlanarBody
+    segment : int
+        Row of the segment.
+    corners : int
+        Number of corners.
+
+    Returns
+    -------
+    list of tuple of float
+        x and z from the centre of mass, m.
     """
     xx, xz, zz = body.shadow[segment]
     root = np.linalg.cholesky(np.array([[xx, xz], [xz, zz]]))
@@ -141,5 +178,5 @@ def outline(body: PlanarBody, segment: int, corners: int) -> list[tuple[float, f
 
 
 def _quarter_turn(arm: Array) -> Array:
-    """Return the velocity of a point on a unit spin about an arm's foot."""
+    """Return the velocity of an arm's end that rotates about its start at 1 rad/s."""
     return np.array([-arm[1], arm[0]])

@@ -1,8 +1,8 @@
 """Joints that yield, in the plane: the spatial springs and dampers between two points.
 
-Pymunk has no such joint, and its steps are long, so the force is taken where it will be at the
-step's end (backward Euler for one spring on the mass that both segments, free of all others, put
-against it): it is then stable at any step and tends to the spring's own force as steps shrink.
+Pymunk has no such joint, and its steps are long, so the force is that at the step's end (backward
+Euler for one spring on the effective mass of the two segments, free of all others): it is stable
+at any step and tends to the exact spring force as steps shrink.
 """
 
 import math
@@ -14,12 +14,24 @@ from models.planar.space import ANGLE, FORCE_X, FORCE_Z, SPEED_X, SPEED_Z, SPIN,
 
 @inlined_kernel
 def add_bushings(body, joints, state, ahead, given):
-    """Add the forces of the joints that yield to what is given for a step of ``ahead`` s."""
+    """Add the forces of the joints that yield to the loads of a step.
+
+    Parameters
+    ----------
+    body : PlanarBody
+    joints : PlanarJoints
+    state : (b, 6) array
+        x, z (m), angle (rad) and their rates of all bodies.
+    ahead : float
+        Length of the step, s.
+    given : (b, 5) array
+        Forces (N) and torques (N m) are increased in place.
+    """
     for i in range(1, body.mass.shape[0]):
         if not joints.yields[i]:
             continue
         p = body.parent[i]
-        # The child's joint point, and its lever on both segments, after the step.
+        # The child's joint point, and its lever arm on both segments, after the step.
         turn = state[i, ANGLE] + ahead * state[i, SPIN]
         c, s = math.cos(turn), math.sin(turn)
         ax, az = body.joint[i, 0] - body.centre[i, 0], body.joint[i, 1] - body.centre[i, 1]
@@ -34,7 +46,7 @@ def add_bushings(body, joints, state, ahead, given):
             z - state[p, Z] - ahead * state[p, SPEED_Z],
         )
         dx, dz = px - (c * ax - s * az), pz - (s * ax + c * az)
-        # Velocity against the point of the parent that is there.
+        # Velocity relative to the coincident point of the parent.
         vx = state[i, SPEED_X] - state[i, SPIN] * rz - state[p, SPEED_X] + state[p, SPIN] * pz
         vz = state[i, SPEED_Z] + state[i, SPIN] * rx - state[p, SPEED_Z] - state[p, SPIN] * px
         fx, fz = 0.0, 0.0

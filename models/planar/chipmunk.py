@@ -1,7 +1,7 @@
-"""Chipmunk's own functions, as the compiled step loop calls them.
+"""Chipmunk's own functions, as called by the compiled step loop.
 
-Pymunk wraps the C library Chipmunk; a call through Python a step would cost more than the step.
-What is used here is what ``pymunk.batch`` and ``Space.step`` call, by their addresses.
+Pymunk wraps the C library Chipmunk; one call through Python per step would cost more than the step.
+The functions used here are those that ``pymunk.batch`` and ``Space.step`` call, by their addresses.
 """
 
 from typing import Any, NamedTuple
@@ -16,7 +16,7 @@ from pymunk.batch import BodyFields, Buffer
 
 
 class _Function(types.WrapperAddressProtocol):
-    """A C function by its address, which compiled code can call."""
+    """A C function given by its address, callable from compiled code."""
 
     def __init__(self, name: str, *arguments: Any) -> None:
         self._address = _address(ffi.addressof(lib, name))
@@ -42,12 +42,16 @@ WRITE_BODY = _address(ffi.addressof(lib, "pmSpaceBodySetIteratorFuncBatched"))
 
 
 class Transfer(NamedTuple):
-    """One way of values between bodies and an array.
+    """A transfer of values in one direction between bodies and an array.
 
     Attributes
     ----------
-    data : address of Pymunk's description. place : (1,) where in the array the next value goes or
-        comes from; 0 before each transfer. keep : what must live as long.
+    data : int
+        Address of Pymunk's description.
+    place : (1,) array
+        Index in the array of the next value; set to 0 before each transfer.
+    keep : tuple
+        Objects that must stay alive as long as the transfer.
     """
 
     data: int

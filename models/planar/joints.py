@@ -1,8 +1,8 @@
-"""Joints in the plane: the spherical joints of the body, made to turn about y alone.
+"""Joints in the plane: the spherical joints of the body, restricted to rotation about y.
 
-A spherical joint that may only turn about one axis has an elastic energy over one angle. Its
-torque is the slope of that energy; ranges, stops and the neck's stiffness are thus those of the
-spatial body in the posture that it has, and no limit of the plane is invented.
+A spherical joint restricted to one axis has an elastic energy that depends on one angle. Its torque
+is the negative slope of that energy; ranges, stops and the neck's stiffness are therefore those of
+the spatial body in its posture, without additional assumptions for the plane.
 """
 
 from typing import NamedTuple
@@ -32,9 +32,15 @@ class PlanarJoints(NamedTuple):
 
     Attributes
     ----------
-    torque : (n, CELLS + 1) N m on the child, over its turn from the start against its parent, from
-        -pi to pi. damping : (n,) N m s/rad. friction : (n,) N m.
-    yields, give_low, give_high, give_damping, give_range : as of the spatial joints.
+    torque : (n, CELLS + 1) array
+        Torque on the child over its rotation relative to its parent since the start, from -pi to
+        pi, N m.
+    damping : (n,) array
+        N m s/rad.
+    friction : (n,) array
+        N m.
+    yields, give_low, give_high, give_damping, give_range : array
+        As in the spatial ``Joints``.
     """
 
     torque: Array
@@ -48,11 +54,13 @@ class PlanarJoints(NamedTuple):
 
 
 def joints_in_plane(joints: Joints, body: PlanarBody) -> PlanarJoints:
-    """Return the resistance of a body's joints to turning about y.
+    """Return the resistance of a body's joints to rotation about y.
 
     Parameters
     ----------
-    joints : of the spatial body. body : in the plane.
+    joints : Joints
+        Of the spatial body.
+    body : PlanarBody
     """
     square = body.normal**2
     weight = np.array([1.0, 1.0, TWIST_FRICTION])
@@ -70,12 +78,12 @@ def joints_in_plane(joints: Joints, body: PlanarBody) -> PlanarJoints:
 
 def _torque_table(joints: Joints, body: PlanarBody) -> Array:
     width = 2.0 * np.pi / CELLS
-    # Between these lie the table's angles: a cell's mean torque is its drop of energy over width.
+    # The table's angles lie between these: the mean torque is the energy drop over the width.
     angle = (np.arange(CELLS + 2) - 0.5) * width - np.pi
     torque = np.zeros((body.parent.size, CELLS + 1))
     for i in range(1, body.parent.size):
-        # The child from the centre of its range: a quaternion that is linear in cosine and sine of
-        # half the turn.
+        # Child relative to the centre of its range: a quaternion linear in cosine and sine of half
+        # the rotation.
         centre = multiply(body.orientation[body.parent[i]], joints.centre[i]) * _CONJUGATE
         start = multiply(centre, body.orientation[i])
         turned = multiply(centre, multiply(_TURN, body.orientation[i]))
@@ -89,7 +97,7 @@ def _torque_table(joints: Joints, body: PlanarBody) -> Array:
 
 
 def _rotation_vector(quaternion: Array) -> Array:
-    """Return the rotation vectors (k, 3) in rad of unit quaternions (k, 4), half a turn at most."""
+    """Return the rotation vectors (k, 3) in rad, at most pi long, of unit quaternions (k, 4)."""
     signed = quaternion * np.where(quaternion[:, :1] < 0.0, -1.0, 1.0)
     size = np.linalg.norm(signed[:, 1:], axis=1)
     # atan2(s, w) / s is 1 where both meet the identity.
@@ -98,7 +106,7 @@ def _rotation_vector(quaternion: Array) -> Array:
 
 
 def _held(torque: Array, far: NDArray[np.bool_]) -> Array:
-    """Return a table that keeps, beyond the first far angle on either side, its last value."""
+    """Return a table held constant beyond the first far angle on either side."""
     held = torque.copy()
     middle = torque.size // 2
     right = np.flatnonzero(far[middle:])

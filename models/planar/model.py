@@ -37,10 +37,10 @@ _SPATIAL = data.load("multibody.toml")
 
 
 class PlanarModel(CrashModel):
-    """The body held in the plane of the car's travel: Pymunk's joints, our contact with the car.
+    """The body restricted to the plane of the car's travel: Pymunk's joints, our car contact.
 
-    See ``CrashModel`` for its parameters. Inputs and nominal values are those of the multibody
-    model; what it makes nothing of is marked.
+    See ``CrashModel`` for the parameters. Inputs and nominal values are those of the multibody
+    model; inputs that this model ignores are marked.
     """
 
     name = "planar"
@@ -108,7 +108,7 @@ class PlanarModel(CrashModel):
 
 
 def _show(body: PlanarBody, motion: PlanarMotion, contacts: Contacts) -> None:
-    """Fill motion and surfaces at the start."""
+    """Compute motion and surfaces at the start."""
     state = np.zeros((len(SEGMENTS), STATE))
     state[:, :2] = body.centre
     show_surfaces(body, state, motion, contacts)

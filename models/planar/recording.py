@@ -1,4 +1,4 @@
-"""What a planar run writes down beside what all crash models do: accelerations, poses, landing."""
+"""Recording specific to the planar model: accelerations, poses, landing."""
 
 import math
 from enum import IntEnum
@@ -13,7 +13,7 @@ TOUCH = 0.005
 
 
 class Memory(IntEnum):
-    """Entries of the memory from step to step."""
+    """Entries of the values that are kept from step to step."""
 
     TICKS = 0
     STEPS = 1
@@ -30,7 +30,18 @@ class Memory(IntEnum):
 
 @inlined_kernel
 def write_row(row, time, model, data):
-    """Write a row, and into the one before the head's acceleration since then."""
+    """Write a row of the record, and the head's acceleration since the last row into that row.
+
+    Parameters
+    ----------
+    row : int
+        Row of the record.
+    time : float
+        s.
+    model : PlanarModel
+    data : PlanarData
+        ``record`` is filled.
+    """
     body, road, head = model.body, model.road, model.settings.head
     state, memory, record = data.state, data.memory, data.record
     if row > 0:
@@ -48,7 +59,7 @@ def write_row(row, time, model, data):
     for k in range(3):
         record[row, Column.SPIN + k] = -state[head, SPIN] * body.normal[head, k]
     write_contact_forces(row, time, head, data.motion, data.contacts, data.car, record)
-    # Pymunk's impulses on the road are no forces.
+    # Pymunk gives impulses on the road, not forces.
     record[row, Column.HEAD_ROAD_FORCE] = math.nan
     record[row, Column.REGION_FORCE + data.contacts.zone_force.shape[0] - 1] = math.nan
     write_centre(row, body.mass, data.motion, record)
@@ -56,9 +67,25 @@ def write_row(row, time, model, data):
 
 @inlined_kernel
 def write_poses(row, time, body, state, orientation, contacts, car, frames):
-    """Write the poses of all segments: their place across the plane, the start's quaternion turned.
+    """Write the poses of all segments, with their initial quaternions rotated about y.
 
-    ``orientation`` (n, 4) is filled.
+    Parameters
+    ----------
+    row : int
+        Row of the frames.
+    time : float
+        s.
+    body : PlanarBody
+    state : (b, 6) array
+        x, z (m), angle (rad) and their rates of all bodies.
+    orientation : (n, 4) array
+        Filled with the quaternions.
+    contacts : Contacts
+        State and results of the contacts.
+    car : (6,) array
+        x, y (m) and yaw (rad) of the car's frame and their rates.
+    frames : (rows, 4 + 7 n) array
+        Row ``row`` is filled.
     """
     for i in range(body.mass.shape[0]):
         # About -y.
@@ -80,7 +107,21 @@ def write_poses(row, time, body, state, orientation, contacts, car, frames):
 
 @inlined_kernel
 def lands(settings, motion, contacts, ahead, any_segment):
-    """Return whether trunk or head, or any segment, touches the road within ``ahead`` s."""
+    """Return whether trunk or head, or any segment, touches the road within a given time.
+
+    Parameters
+    ----------
+    settings : PlanarSettings
+        Gives the rows of head and trunk.
+    motion : PlanarMotion
+        Velocities of the segments.
+    contacts : Contacts
+        Ellipsoid centres and shapes.
+    ahead : float
+        Time ahead, s.
+    any_segment : bool
+        Whether all segments count.
+    """
     for i in range(contacts.centre.shape[0]):
         gap = contacts.centre[i, 2] - math.sqrt(contacts.shape[i, 5]) - TOUCH
         fall = max(-motion.velocity[i, 2], 0.0)
@@ -91,9 +132,18 @@ def lands(settings, motion, contacts, ahead, any_segment):
 
 @inlined_kernel
 def note_landing(time, settings, data):
-    """Note when trunk or head lands, and when the road begins to act on the head's signals.
+    """Record when trunk or head lands, and when the road begins to affect the head's signals.
 
-    That is when any segment lands after the body, its head having met the car, was in the air.
+    The latter is the first landing of any segment after the head has met the car and the body has
+    been airborne.
+
+    Parameters
+    ----------
+    time : float
+        s.
+    settings : PlanarSettings
+    data : PlanarData
+        ``summary`` and ``memory`` are updated.
     """
     motion, contacts, memory, summary = data.motion, data.contacts, data.memory, data.summary
     coarse = settings.coarse * settings.tick

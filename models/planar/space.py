@@ -1,7 +1,7 @@
 """The Pymunk space of a crash: segments, joints, road, and the car as a kinematic body.
 
-Pymunk solves the joints and the contact with the road; forces that deform something (car, flesh,
-joint stops) come from outside and are set before every step.
+Pymunk solves the joints and the contact with the road; forces of deformation (car, flesh, joint
+stops) are computed outside and set before every step.
 """
 
 import math
@@ -49,12 +49,22 @@ _GIVEN_FIELDS = BodyFields.VELOCITY | BodyFields.FORCE | BodyFields.TORQUE
 
 
 class Link(NamedTuple):
-    """A space as the compiled step loop has it: addresses, and places in the two arrays.
+    """A space as used by the compiled step loop: addresses, and positions in the two arrays.
 
     Attributes
     ----------
-    space : address. reader, read_data, read_place : of a transfer into ``state``.
-    writer, write_data, write_place : of one out of ``given``. car : row of the car.
+    space : int
+        Address of the space.
+    reader, read_data : int
+        Addresses of the transfer into ``state``.
+    read_place : (1,) array
+        Its index of the next value.
+    writer, write_data : int
+        Addresses of the transfer out of ``given``.
+    write_place : (1,) array
+        Its index of the next value.
+    car : int
+        Row of the car.
     """
 
     space: int
@@ -68,22 +78,29 @@ class Link(NamedTuple):
 
 
 class PlanarSpace:
-    """A fresh space for one crash.
+    """A new space for one crash.
 
     Pymunk numbers bodies and keeps contacts from step to step, so a space that has been used gives
-    other bits: every run builds its own.
+    different bits: every run builds its own.
 
     Parameters
     ----------
-    body, joints, road : of the scenario, in the plane.
-    ellipsoids : for the energy that flesh gives back.
-    speed : m/s of the car at first contact.
+    body : PlanarBody
+    joints : PlanarJoints
+    road : Road
+    ellipsoids : Ellipsoids
+        Give the energy that flesh returns.
+    speed : float
+        Speed of the car at first contact, m/s.
 
     Attributes
     ----------
-    state : (b, 6) x, z (m), angle (rad) and their rates of all bodies, segments first.
-    space : Pymunk's own.
-    given : (b, 5) velocity (m/s), force (N) and torque (N m) for the next step. link : Link
+    state : (b, 6) array
+        x, z (m), angle (rad) and their rates of all bodies, segments first.
+    space : pymunk.Space
+    given : (b, 5) array
+        Velocity (m/s), force (N) and torque (N m) for the next step.
+    link : Link
     """
 
     def __init__(
@@ -149,9 +166,9 @@ def _joint(
     joints: PlanarJoints,
     row: int,
 ) -> list[pymunk.Constraint]:
-    """Return pivot, damper and friction of a joint; its springs and stops come from outside.
+    """Return pivot, damper and friction of a joint; its springs and stops are applied from outside.
 
-    A joint that yields has no place and no pivot.
+    A joint that yields has no position and no pivot.
     """
     damper = pymunk.DampedRotarySpring(parent, child, 0.0, 0.0, float(joints.damping[row]))
     held: list[pymunk.Constraint] = [damper]
@@ -167,9 +184,10 @@ def _joint(
 
 
 def _restitution(ellipsoids: Ellipsoids, segment: int) -> float:
-    """Return the restitution of a segment on the road: the root of the energy that it gives back.
+    """Return the coefficient of restitution of a segment on the road.
 
-    By the law against the road, at its last knot.
+    It is the root of the returned share of the energy in the law against the road, at its last
+    knot.
     """
     law = int(ellipsoids.surface_law[segment, -1])
     last = int(ellipsoids.counts[law]) - 1
@@ -178,7 +196,7 @@ def _restitution(ellipsoids: Ellipsoids, segment: int) -> float:
 
 
 def _road(ground: pymunk.Body, road: Road) -> list[pymunk.Shape]:
-    """Return the road, from some place on with another friction if there is one."""
+    """Return the shapes of the road: one, or two if its friction changes at some distance."""
     change = min(max(road.wet_from, -REACH), REACH)
     parts = [(-REACH, change, road.friction), (change, REACH, road.wet_friction)]
     shapes: list[pymunk.Shape] = []

@@ -1,4 +1,4 @@
-"""The step loop: our forces and record between the steps of Pymunk's space, all compiled."""
+"""The step loop: our forces and records between the steps of Pymunk's space, all compiled."""
 
 import math
 from typing import NamedTuple
@@ -54,7 +54,17 @@ FASTEST = 1e3
 
 
 class PlanarMotion(NamedTuple):
-    """Places and rates of ``n`` segments in world axes, (n, 3), as the contacts read them."""
+    """Positions and rates of ``n`` segments in world axes, as used by the contacts.
+
+    Attributes
+    ----------
+    centre : (n, 3) array
+        m.
+    velocity : (n, 3) array
+        m/s.
+    angular_velocity : (n, 3) array
+        rad/s.
+    """
 
     centre: Array
     velocity: Array
@@ -62,20 +72,39 @@ class PlanarMotion(NamedTuple):
 
 
 class PlanarLoads(NamedTuple):
-    """Loads (n, 3) on the segments in world axes."""
+    """Loads on the segments in world axes.
+
+    Attributes
+    ----------
+    force : (n, 3) array
+        N.
+    torque : (n, 3) array
+        About the centre of mass, N m.
+    """
 
     force: Array
     torque: Array
 
 
 class PlanarSettings(NamedTuple):
-    """How a run is stepped and recorded.
+    """Parameters of the step loop and of the recording.
 
     Attributes
     ----------
-    tick : s, the finest step. coarse, flight, road : ticks a step in contact with the car, above
-        it, and clear of it. time_limit : s. step_limit : steps. frame_every : ticks.
-    head : row of the head. trunk : highest row of the trunk.
+    tick : float
+        Finest step, s.
+    coarse, flight, road : int
+        Ticks per step in contact with the car, above it, and clear of it.
+    time_limit : float
+        Largest duration of a crash, s.
+    step_limit : int
+        Largest number of steps.
+    frame_every : int
+        Ticks between frames.
+    head : int
+        Row of the head.
+    trunk : int
+        Highest row of the trunk.
     """
 
     tick: float
@@ -90,14 +119,21 @@ class PlanarSettings(NamedTuple):
 
 
 class PlanarModel(NamedTuple):
-    """What does not change in a run.
+    """Data that are constant during a run.
 
     Attributes
     ----------
-    link : of the space. body, joints, ellipsoids : of the body held in the plane.
-    front : geometry of the car's front, one of the types of ``models.crash.front``.
-    road, car_motion : of the surroundings.
-    settings : of the step loop.
+    link : Link
+        Addresses of the space.
+    body : PlanarBody
+    joints : PlanarJoints
+    ellipsoids : Ellipsoids
+        Of the body in the plane.
+    front : Zones
+        Geometry of the car's front, one of the types of ``models.crash.front``.
+    road : Road
+    car_motion : CarMotion
+    settings : PlanarSettings
     """
 
     link: Link
@@ -111,16 +147,29 @@ class PlanarModel(NamedTuple):
 
 
 class PlanarData(NamedTuple):
-    """State, loads, workspace and what is written down; all of it changes in a run.
+    """State, loads, workspace and recorded arrays, all changed during a run.
 
     Attributes
     ----------
-    state, given : of the space.
-    motion, loads, contacts : of the body, as the contacts read them.
-    orientation : (n, 4) workspace of the frames.
-    car : as in ``models.vehicle.motion``. power : (channels,) workspace.
-    memory : from step to step; see ``Memory``. blow : never filled, as arms let the head pass.
-    record, frames, head_contact, summary : as in ``models.crash.record``; road forces are NaN.
+    state : (b, 6) array
+        See ``PlanarSpace``.
+    given : (b, 5) array
+        See ``PlanarSpace``.
+    motion : PlanarMotion
+    loads : PlanarLoads
+    contacts : Contacts
+    orientation : (n, 4) array
+        Workspace of the frames.
+    car : (6,) array
+        As in ``models.vehicle.motion``.
+    power : (channels,) array
+        Workspace, W.
+    memory : (entries,) array
+        Values kept from step to step; see ``models.planar.recording.Memory``.
+    blow : (entries,) array
+        Unused here, as the head passes through the arms.
+    record, frames, head_contact, summary : array
+        As in ``models.crash.record``; road forces are NaN.
     """
 
     state: Array
@@ -145,15 +194,27 @@ def empty_motion(n: int) -> PlanarMotion:
 
 
 def empty_loads(n: int) -> PlanarLoads:
-    """Return no load on ``n`` segments."""
+    """Return zero loads on ``n`` segments."""
     return PlanarLoads(np.zeros((n, 3)), np.zeros((n, 3)))
 
 
 @inlined_kernel
 def update_motion(body, state, ahead, motion, contacts):
-    """Write motion, ellipsoid centres and shape matrices ``ahead`` s after a state.
+    """Compute motion, ellipsoid centres and shape matrices ``ahead`` s after a state.
 
-    Bodies move on at the velocities that they have.
+    Bodies are extrapolated at constant velocity.
+
+    Parameters
+    ----------
+    body : PlanarBody
+    state : (b, 6) array
+        x, z (m), angle (rad) and their rates of all bodies.
+    ahead : float
+        s.
+    motion : PlanarMotion
+        Filled.
+    contacts : Contacts
+        ``centre`` and ``shape`` are filled.
     """
     for i in range(body.mass.shape[0]):
         angle = state[i, ANGLE] + ahead * state[i, SPIN]
@@ -168,7 +229,7 @@ def update_motion(body, state, ahead, motion, contacts):
         xx, xz, zz = body.shadow[i, 0], body.shadow[i, 1], body.shadow[i, 2]
         contacts.shape[i, 0] = c * c * xx - 2.0 * c * s * xz + s * s * zz
         contacts.shape[i, 2] = c * s * (xx - zz) + (c * c - s * s) * xz
-        # Across the plane any extent will do: there is no contact along it.
+        # The extent across the plane is arbitrary: there is no contact in that direction.
         contacts.shape[i, 3] = 1.0
         contacts.shape[i, 5] = s * s * xx + 2.0 * c * s * xz + c * c * zz
 
@@ -223,7 +284,7 @@ def _apply_loads(model, data, ahead):
     """Write the loads of a step of ``ahead`` s, and every body's own velocity.
 
     Chipmunk moves the bodies at their old velocities before it changes these, so the forces are
-    those where the bodies will then be: explicit Euler becomes the symplectic one.
+    evaluated at the positions after that move: explicit Euler becomes symplectic Euler.
     """
     body, ellipsoids = model.body, model.ellipsoids
     state, given, motion, loads = data.state, data.given, data.motion, data.loads
@@ -248,11 +309,11 @@ def _apply_loads(model, data, ahead):
 
 @inlined_kernel
 def _end_reason(model, data, time):
-    """Return why the run ends now, ``GOES_ON`` if it does not."""
+    """Return why the run ends now, ``GOES_ON`` if it does not end."""
     memory = data.memory
     speed, spread = speeds_of(model.body.mass, data.motion)
     memory[Memory.QUIET] = time_at_rest(speed, spread, memory[Memory.LENGTH], memory[Memory.QUIET])
-    # Chipmunk ends the whole process where it meets a number that is none.
+    # Chipmunk aborts the whole process when it meets a NaN.
     if not spread < FASTEST:
         return EndReason.NOT_FINITE.value
     reason = rest_reason(memory[Memory.QUIET], data.contacts)
@@ -268,7 +329,7 @@ def _step(step_space, each_body, model, data, length):
     head = model.settings.head
     memory[Memory.SPEED_X], memory[Memory.SPEED_Z] = state[head, SPEED_X], state[head, SPEED_Z]
     memory[Memory.SPIN], memory[Memory.LENGTH] = state[head, SPIN], length
-    # The mean speed brings the car exactly to where it is at the step's end.
+    # With the mean speed the car reaches exactly its position at the step's end.
     car_state(model.car_motion, memory[Memory.TICKS] * model.settings.tick, data.car)
     _apply_loads(model, data, length)
     data.given[link.car, GIVEN_X] = (data.car[0] - state[link.car, X]) / length
@@ -331,5 +392,16 @@ def simulate(step_space, each_body, model, data):
 
 @kernel
 def show_surfaces(body, state, motion, contacts):
-    """Fill motion and surfaces for a state, before there is a step."""
+    """Compute motion and surfaces for a state, before the first step.
+
+    Parameters
+    ----------
+    body : PlanarBody
+    state : (b, 6) array
+        x, z (m), angle (rad) and their rates of all bodies.
+    motion : PlanarMotion
+        Filled.
+    contacts : Contacts
+        ``centre`` and ``shape`` are filled.
+    """
     update_motion(body, state, 0.0, motion, contacts)

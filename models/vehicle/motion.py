@@ -1,8 +1,8 @@
 """Prescribed motion of the car: braking on an arc until it stops.
 
 A point of the car's axis (``rotation_centre`` behind the front, near the centre of gravity) moves
-on a circle whose radius is the impact speed over the yaw rate, the curvature of the skid marks;
-the car's axis stays tangent to it, so the yaw rate falls with the speed.
+on a circle whose radius is the impact speed over the yaw rate, the radius of curvature of the skid
+marks; the car's axis stays tangent to it, so the yaw rate falls with the speed.
 """
 
 import math
@@ -17,8 +17,16 @@ class CarMotion(NamedTuple):
 
     Attributes
     ----------
-    speed : m/s at impact. deceleration : m/s2. curvature : 1/m. pivot : m behind the front.
-    onset : s from impact to braking.
+    speed : float
+        Speed at impact, m/s.
+    deceleration : float
+        m/s2.
+    curvature : float
+        Curvature of the path, 1/m.
+    pivot : float
+        Distance of the point that follows the path behind the front, m.
+    onset : float
+        Time from impact to braking, s.
     """
 
     speed: float
@@ -39,11 +47,20 @@ def braking_motion(
 
     Parameters
     ----------
-    impact_speed : m/s. friction_tyre_road : 1. yaw_rate : rad/s at impact, positive to the left.
-    rotation_centre : m behind the front.
-    pull : m/s2, gravity along the travel of a car on a falling road.
+    impact_speed : float
+        m/s.
+    friction_tyre_road : float
+        Coefficient of friction.
+    yaw_rate : float
+        Yaw rate at impact, positive to the left, rad/s.
+    rotation_centre : float
+        Distance behind the front, m.
+    pull : float
+        Gravity component along the travel of a car on a falling road, m/s2.
 
-    A road too steep for the tyres leaves a tenth of the braking, so that the car still stops.
+    Notes
+    -----
+    On a road too steep for the tyres a tenth of the braking is kept, so that the car still stops.
     """
     braking = friction_tyre_road * STANDARD_GRAVITY
     curvature = yaw_rate / impact_speed if impact_speed > 0.0 else 0.0
@@ -57,7 +74,16 @@ def stopping_distance(motion: CarMotion) -> float:
 
 @inlined_kernel
 def car_state(motion, time, car):
-    """Write origin x, y (m), yaw (rad), their rates (m/s, m/s, rad/s) into ``car`` (6,)."""
+    """Write position, yaw and their rates at a time.
+
+    Parameters
+    ----------
+    motion : CarMotion
+    time : float
+        Time after impact, s.
+    car : (6,) array
+        Filled: x, y (m) and yaw (rad) of the car's frame and their rates (m/s, m/s, rad/s).
+    """
     stop = motion.speed / motion.deceleration
     coast = min(time, motion.onset)
     t = min(time - coast, stop)

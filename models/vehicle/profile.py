@@ -21,7 +21,17 @@ EDGE_TANGENT = math.radians(40.0)
 
 @dataclass(frozen=True)
 class Zone:
-    """One zone of the static front; lengths in m, angles in rad. See ``Zones``."""
+    """One zone of the static front; lengths in m, angles in rad.
+
+    Attributes
+    ----------
+    name : str
+    coordinate : str
+        Input that is the zone's corridor coordinate.
+    kind, origin, radius, direction, length, arc, inner, half_width, curvature, ploughing
+        See ``Zones``.
+    corridor : Corridor
+    """
 
     name: str
     kind: int
@@ -44,10 +54,14 @@ class Vehicle:
 
     Attributes
     ----------
-    name, title, source : identification.
-    dive_pivot, rotation_centre : m behind the foremost point.
-    hood_side : m, from the centre line to the gap between hood and fender.
-    zones : tuple of Zone, from the ground up.
+    name, title, source : str
+        Identification.
+    dive_pivot, rotation_centre : float
+        Distances behind the foremost point, m.
+    hood_side : float
+        Distance from the centre line to the gap between hood and fender, m.
+    zones : tuple of Zone
+        From the ground up.
     """
 
     name: str
@@ -60,12 +74,12 @@ class Vehicle:
 
     @functools.cached_property
     def joined(self) -> NDArray[np.bool_]:
-        """The (z, z) table of zones that lie side by side or end to end."""
+        """The (z, z) table of zones that are adjacent, side by side or end to end."""
         return _joined(self.zones)
 
     @functools.cached_property
     def bend(self) -> Array:
-        """How far out (z,) m each zone keeps bending: with those beside it."""
+        """Half width (z,) over which each zone is curved, including adjacent zones, m."""
         return np.array([_widest(self.zones, zone) for zone in self.zones])
 
     @functools.cached_property
@@ -90,7 +104,7 @@ class Vehicle:
         )
 
     def zone_index(self, name: str) -> int:
-        """Return the row of a zone; -1 if the car has none of that name."""
+        """Return the row of a zone, or -1 if the car has no zone of that name."""
         for j, zone in enumerate(self.zones):
             if zone.name == name:
                 return j
@@ -109,7 +123,7 @@ def load_vehicle(name: str) -> Vehicle:
     Raises
     ------
     ValueError
-        If there is none of that name.
+        If there is no vehicle of that name.
     """
     if name not in vehicle_names():
         raise ValueError(f"no vehicle {name!r}: choose one of {', '.join(vehicle_names())}")
@@ -151,14 +165,14 @@ def _read_zone(row: dict[str, object]) -> Zone:
 
 
 def _turn(points: Array, angle: float) -> Array:
-    """Turn (x, z) vectors nose down by ``angle`` rad."""
+    """Rotate (x, z) vectors nose down by ``angle`` rad."""
     c, s = math.cos(angle), math.sin(angle)
     return np.stack([c * points[..., 0] + s * points[..., 1],
                      -s * points[..., 0] + c * points[..., 1]], axis=-1)  # fmt: skip
 
 
 def _dive_shift(vehicle: Vehicle, dive_angle: float) -> Array:
-    """Return the (x, z) shift after the turn about the origin that keeps the front at x = 0."""
+    """Return the (x, z) shift after the rotation about the origin that keeps the front at x = 0."""
     pivot = np.array([-vehicle.dive_pivot, 0.0])
     shift = pivot - _turn(pivot, dive_angle)
     rolls = vehicle.zone_table.kind == ROLL
@@ -174,8 +188,12 @@ def build_zones(
     Parameters
     ----------
     vehicle : Vehicle
-    dive_angle : rad, nose down. friction_body_car : 1.
-    ploughing : factor on the ploughing of all panels.
+    dive_angle : float
+        Nose down, rad.
+    friction_body_car : float
+        Coefficient of friction.
+    ploughing : float
+        Factor on the ploughing of all panels.
     """
     table = vehicle.zone_table
     shift = _dive_shift(vehicle, dive_angle)
@@ -218,7 +236,7 @@ def _ends(zone: Zone) -> Array:
 
 
 def _joined(zones: Sequence[Zone]) -> NDArray[np.bool_]:
-    """Return the (z, z) table of zones that lie side by side or end to end."""
+    """Return the (z, z) table of zones that are adjacent, side by side or end to end."""
     table = np.zeros((len(zones), len(zones)), dtype=np.bool_)
     for i, zone in enumerate(zones):
         for j, other in enumerate(zones):
@@ -228,25 +246,39 @@ def _joined(zones: Sequence[Zone]) -> NDArray[np.bool_]:
 
 
 def _widest(zones: Sequence[Zone], zone: Zone) -> float:
-    """Return the half width (m) of a zone and those beside it."""
+    """Return the half width (m) of a zone including the zones beside it."""
     return max([zone.half_width, *(z.half_width for z in zones if _beside(zone, z))])
 
 
 def static_point(vehicle: Vehicle, dive_angle: float, point: Array) -> Array:
-    """Return a point (x, z) of the diving car in the frame of the static car."""
+    """Return a point of the diving car in the frame of the static car.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    dive_angle : float
+        Nose down, rad.
+    point : (2,) array
+        x and z in the frame of the diving car, m.
+
+    Returns
+    -------
+    (2,) array
+        x and z, m.
+    """
     return _turn(np.asarray(point) - _dive_shift(vehicle, dive_angle), -dive_angle)
 
 
 @functools.cache
 def _tape(vehicle_name: str, zone: int) -> Array:
-    """Return the (k, 2) path (x, z) of a tape drawn tight over the zones up to ``zone``.
+    """Return the (k, 2) path (x, z) of a taut tape over the zones up to ``zone``.
 
     It starts on the road under the foremost point and follows the convex hull of the zones from
-    the ground up; of a panel at the end only its front border counts.
+    the ground up; of a panel at the end only its front border is included.
     """
     vehicle = load_vehicle(vehicle_name)
     points = []
-    # A side zone lies beside another one in the same side view.
+    # A side zone coincides with another zone in side view.
     below = [entry for entry in vehicle.zones[:zone] if entry.inner == 0.0]
     for entry in [*below, vehicle.zones[zone]]:
         if entry.kind == ROLL:
@@ -276,26 +308,43 @@ def _tape(vehicle_name: str, zone: int) -> Array:
 
 
 def wrap_around_distance(vehicle_name: str, zone: int, point: Array) -> float:
-    """Return the length (m) of a tape drawn tight from the road to a point of a zone.
+    """Return the length (m) of a taut tape from the road to a point of a zone.
 
     Parameters
     ----------
     vehicle_name : str
-    zone : row of the zone that holds the point.
-    point : (2,) x and z on the zone's surface, static car.
+    zone : int
+        Row of the zone that contains the point.
+    point : (2,) array
+        x and z on the zone's surface, static car, m.
     """
     line = _tape(vehicle_name, zone)
     step = np.diff(line, axis=0)
     ahead = np.arctan2(step[:, 1], step[:, 0])
     direct = np.arctan2(point[1] - line[:, 1], point[0] - line[:, 0])
-    # The tape leaves the hull where the straight way to the point turns less than the hull does.
+    # The tape leaves the hull where the straight line to the point is flatter than the hull.
     leaves = np.append(direct[:-1] <= ahead + 1e-12, True)
     k = int(np.argmax(leaves))
     return float(np.hypot(step[:k, 0], step[:k, 1]).sum() + np.hypot(*(point - line[k])))
 
 
 def surface_point(zones: Zones, zone: int, point: Array) -> Array:
-    """Return the point (x, z) of a zone's undeformed surface that is nearest to a point."""
+    """Return the point of a zone's undeformed surface that is nearest to a point.
+
+    Parameters
+    ----------
+    zones : Zones
+        Geometry of the front.
+    zone : int
+        Row of the zone.
+    point : (2,) array
+        x and z, m.
+
+    Returns
+    -------
+    (2,) array
+        x and z, m.
+    """
     away = np.asarray(point) - zones.origin[zone]
     if zones.kind[zone] == ROLL:
         return np.asarray(zones.origin[zone] + zones.radius[zone] * away / np.linalg.norm(away))

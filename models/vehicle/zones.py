@@ -1,4 +1,4 @@
-"""The front of a car as the compiled core takes it.
+"""The front of a car in the form that the compiled core uses.
 
 The front is a row of *zones* in its own frame (x forward, z up, origin on the road under the
 foremost point): rolls (cylinders across the car: lower bumper, bumper, hood edge) and panels
@@ -25,20 +25,33 @@ class Zones(NamedTuple):
 
     Attributes
     ----------
-    kind : (z,) ``ROLL`` or ``PANEL``.
-    origin : (z, 2) m, x and z of the roll's axis or of the panel's front border.
-    radius : (z,) m (panel: 0).
-    direction : (z, 2) unit vector (x, z) along the panel, front to rear.
-    length : (z,) m along the panel.
-    arc : (z, 2) rad, lowest and highest direction of the roll's normal, from x towards z.
-    inner, half_width : (z,) m, the zone's borders left and right of the centre line; a zone with
-        ``inner`` above 0 (a fender's side) is a pair of strips.
-    curvature : (z,) 1/m seen from above. bend : (z,) m, how far out the zone keeps bending.
-    joined : (z, z) whether two zones share a border: what slides from one to the other stays in
-        contact.
-    box : (z, 4) m, lowest and highest x, lowest and highest z that a contact point can have.
-    friction : (z,) against the body. ploughing : (z,) share of the resistance of a lasting dent
-        against the slip of the body in it.
+    kind : (z,) array
+        ``ROLL`` or ``PANEL``.
+    origin : (z, 2) array
+        x and z of the roll's axis or of the panel's front border, m.
+    radius : (z,) array
+        m; 0 for a panel.
+    direction : (z, 2) array
+        Unit vector (x, z) along the panel, front to rear.
+    length : (z,) array
+        Along the panel, m.
+    arc : (z, 2) array
+        Lowest and highest direction of the roll's normal, from x towards z, rad.
+    inner, half_width : (z,) array
+        The zone's borders left and right of the centre line, m; a zone with ``inner`` above 0 (a
+        fender's side) is a pair of strips.
+    curvature : (z,) array
+        Seen from above, 1/m.
+    bend : (z,) array
+        Half width over which the zone is curved, m; the surface is straight beyond it.
+    joined : (z, z) array of bool
+        Whether two zones share a border, across which a sliding segment stays in contact.
+    box : (z, 4) array
+        Lowest and highest x, lowest and highest z that a contact point can have, m.
+    friction : (z,) array
+        Coefficient of friction against the body.
+    ploughing : (z,) array
+        Share of the ploughing resistance of a lasting dent against the slip of the body.
     """
 
     kind: Index

@@ -1,10 +1,10 @@
-"""Accident collections: scalars of many accidents, none of which can be repeated.
+"""Accident collections: scalars of many accidents without repetition.
 
-What is not recorded of an accident (posture, gait) makes one crash differ from the next more than
-any model error does. The crash core is therefore run over the whole collection with everything
-unknown drawn anew in each run: a quadratic surface in what is recorded gives the mean, and what is
-left is the scatter of single accidents. Every cause is run on the same draws, so that what it
-changes is a surface as well.
+Unrecorded conditions (posture, gait) scatter accidents more than any model error does. The crash
+core is therefore run over the whole collection with all unknowns sampled in each run: a quadratic
+response surface in the recorded variables gives the mean, and its residuals are the scatter of
+single accidents. Every cause is run on the same draws, so that its effect is a response surface
+too.
 """
 
 from collections.abc import Mapping, Sequence
@@ -40,15 +40,15 @@ from studies.runs import evaluator_of
 Array = NDArray[np.float64]
 
 POOL, PAIRED = 480, 120
-"""Runs of the model as it stands, and of each form of a cause."""
+"""Runs of the base model, and of each form of a cause."""
 MAX_SCORE = 2.5
-"""Score at which the sizes of causes that are tried end."""
+"""Largest standard-normal latent of the sampled sizes of causes."""
 MAX_FAILED = 0.2
-"""Share of runs that may fail."""
+"""Maximum share of failed runs."""
 WIDER = 1.5
 """Factor on the recorded uncertainties for the draws, so that the surface reaches beyond them."""
 LOGARITHMIC = ("hic15", "hic36", "ground_hic15", "clip_3ms", "peak_head_acceleration")
-"""Outputs whose logarithm is taken: their scatter grows with them."""
+"""Outputs whose logarithm is taken, as their scatter grows with their level."""
 AIS = "ais"
 MECHANISM = Mechanism(
     "impact", ((risk_function("nhtsa_lognormal"), 1.0), (risk_function("prasad_mertz"), 1.0))
@@ -85,9 +85,20 @@ def build_collection(
 
     Parameters
     ----------
-    problem : of the data, with measured scalars as they are. data, choice : that it is of.
-    causes : whose changes are run. seed : of the draws. workers : processes, -1 one a core.
-    quiet : show no progress.
+    problem : Problem
+        Of the data, with measured scalars as they are.
+    data : Measured
+        Recorded accidents.
+    choice : ModelChoice
+        The model that is diagnosed.
+    causes : sequence of Cause
+        Causes whose effects are simulated.
+    seed : int
+        Seed of the draws.
+    workers : int
+        Processes, -1 for one per core.
+    quiet : bool
+        No progress line.
 
     Raises
     ------
@@ -128,7 +139,7 @@ def _key(name: str) -> str:
 
 
 def _outputs_of(data: Measured, model: Model) -> tuple[str, ...]:
-    """Return the outputs of the surfaces: those measured, then the usual others."""
+    """Return the outputs of the surfaces: the measured ones, then the default ones."""
     known = [item.name for item in model.outputs]
     usual = ("throw_distance", "wad", "hic15", "head_impact_time", "car_stopping_distance", AIS)
     names = dict.fromkeys([*data.header.scalars, *usual])
@@ -139,7 +150,7 @@ def _outputs_of(data: Measured, model: Model) -> tuple[str, ...]:
 
 
 def _variables(problem: Problem) -> tuple[str, ...]:
-    """Return what the surfaces are in: recorded inputs that differ, and shared unknowns."""
+    """Return the variables of the surfaces: recorded inputs that vary, and shared unknowns."""
     tests = problem.tests
     moving = [
         name
@@ -150,7 +161,7 @@ def _variables(problem: Problem) -> tuple[str, ...]:
 
 
 def _draw(problem: Problem, choice: ModelChoice, model: Model, seed: int) -> _Draws:
-    """Return draws over a collection: accidents as recorded, the rest from what is known."""
+    """Return draws over a collection: recorded inputs as recorded, the others from priors."""
     rng = seeds.generator(seed, seeds.DESIGN)
     tests = problem.tests
     columns = {item.name: np.full(POOL, item.nominal) for item in model.inputs}
@@ -195,7 +206,7 @@ def _run(
 def _outcomes(
     model: Model, table: Array, outputs: Sequence[str], draws: _Draws, count: int
 ) -> Array:
-    """Return what accidents show (count, m): outputs, logarithms, an AIS drawn from the risk."""
+    """Return the observables (count, m): outputs, logarithms, an AIS drawn from the risk."""
     by_name = {item.name: table[:, k] for k, item in enumerate(model.outputs)}
     found = []
     for key in outputs:
@@ -223,7 +234,7 @@ def _change_of(
     seed: int,
     model: Model,
 ) -> Change | None:
-    """Return what a form changes, from runs of the same draws with and without it."""
+    """Return the change by a form, from runs of the same draws with and without it."""
     rng = seeds.generator(seed, seeds.OUTCOME)
     scores = rng.uniform(-MAX_SCORE, MAX_SCORE, (PAIRED, len(form.free)))
     columns = dict(draws.columns)
@@ -242,7 +253,7 @@ def _change_of(
     )
     terms = change_terms(scores, points[:PAIRED], centred=centred)
     coefficients, _ = fit_terms(terms, changed)
-    # An output that never changes must not seem to, by the scatter of the others.
+    # An output that never changes must get no change from the scatter of the fit.
     still = ~np.any(np.abs(np.nan_to_num(changed)) > 0.0, axis=0)
     coefficients[:, still] = 0.0
     return Change(form, centred, coefficients)

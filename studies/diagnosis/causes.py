@@ -55,14 +55,14 @@ def _parameter(effect: Effect, name: str) -> Parameter:
 
 @dataclass(frozen=True)
 class EffectPrior:
-    """The prior of an effect's parameter, held within the range of its input."""
+    """The prior of an effect's parameter, limited to the range of its input."""
 
     prior: Prior
     input: Input
 
     @property
     def unit(self) -> str:
-        """Of its values."""
+        """Unit of its values."""
         return self.input.unit
 
     @property

@@ -1,4 +1,4 @@
-"""What an extended model changes in the conclusions of a study."""
+"""Effect of a model extension on the conclusions of a study."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -19,7 +19,7 @@ OUTPUT = "hic15"
 LIMIT = 700.0
 """HIC15 limit of the case's paper for a child."""
 RUNS, FEWER_RUNS = 1000, 200
-"""Runs with which conclusions are compared, of a model that is cheap and of one that is not."""
+"""Runs for comparing conclusions, of a cheap model and of an expensive one."""
 CHEAP = 0.01
 """CPU time of a run in s below which a model counts as cheap (assumed)."""
 REPLICATE = 50
@@ -27,7 +27,7 @@ REPLICATE = 50
 
 @dataclass(frozen=True)
 class Conclusions:
-    """What a study says: probability above the limit, median, and what drives the output."""
+    """Conclusions of a study: probability above the limit, median, and sensitivities."""
 
     exceedance: statistics.Estimate
     median: statistics.Estimate

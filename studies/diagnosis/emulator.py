@@ -13,9 +13,9 @@ from mcstudy.studyfile.input_space import value_at
 Array = NDArray[np.float64]
 
 RIDGE = 1e-3
-"""Share of the runs by which a coefficient is drawn towards nothing."""
+"""Ridge penalty on a coefficient, as a share of the runs."""
 GRID = np.linspace(-4.0, 4.0, 161)
-"""Scores on which a prior's quantile is inverted."""
+"""Standard-normal latents at which a prior's quantile is inverted."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,16 @@ class Surface:
 
 @dataclass(frozen=True)
 class Change:
-    """What a form of a cause changes, in its scores and the scaled variables.
+    """Change by a form of a cause, in its latents and the scaled variables.
 
     Attributes
     ----------
-    form : Form. centred : whether it changes nothing at scores of zero.
-    coefficients : (terms, outputs).
+    form : Form
+        Form of a cause.
+    centred : bool
+        Whether the change is zero at latents of zero.
+    coefficients : (terms, outputs) array
+        Of the terms by ``change_terms``.
     """
 
     form: Form
@@ -55,7 +59,7 @@ class Change:
         }
 
     def scores(self, parameters: Mapping[str, float]) -> Array:
-        """Return the scores (k,) of the free parameters at their values."""
+        """Return the standard-normal latents (k,) of the free parameters."""
         return np.array(
             [np.interp(parameters[name], grid, GRID) for name, grid in self._grids.items()]
         )
@@ -66,9 +70,16 @@ class Emulator:
 
     Parameters
     ----------
-    name : of the model. outputs : of the surfaces, in order.
-    surface : of the model as it stands. changes : of the causes' forms.
-    wanted : outputs that were measured.
+    name : str
+        Name of the model.
+    outputs : sequence of str
+        Outputs of the surfaces, in order.
+    surface : Surface
+        Of the base model.
+    changes : sequence of Change
+        By the forms of the causes.
+    wanted : collection of str
+        Measured outputs.
     """
 
     def __init__(
@@ -84,7 +95,7 @@ class Emulator:
         self._wanted = tuple(wanted)
 
     def widened(self, _filters: Mapping[str, float], scalars: Collection[str]) -> "Emulator":
-        """Return the emulator with more outputs; signals it has none."""
+        """Return the emulator with more outputs; it has no signals."""
         return Emulator(
             self.name, self.outputs, self._surface, self._changes, (*self._wanted, *scalars)
         )
@@ -120,11 +131,16 @@ def quadratic_terms(points: Array) -> Array:
 
 
 def change_terms(scores: Array, points: Array, *, centred: bool) -> Array:
-    """Return the terms of a change: powers of the scores, alone and times the variables.
+    """Return the terms of a change: powers of the latents, alone and times the variables.
 
     Parameters
     ----------
-    scores : (n, k). points : (n, d). centred : whether it is nothing at scores of zero.
+    scores : (n, k) array
+        Standard-normal latents of the parameters.
+    points : (n, d) array
+        Scaled variables.
+    centred : bool
+        Whether the change is zero at latents of zero.
     """
     n, k = scores.shape
     columns = [] if centred else [np.ones((n, 1)), points]
@@ -136,14 +152,14 @@ def change_terms(scores: Array, points: Array, *, centred: bool) -> Array:
 
 
 def fit_terms(terms: Array, outputs: Array) -> tuple[Array, Array]:
-    """Return coefficients (terms, m) of outputs (n, m), NaN left out, and what is left (n, m)."""
+    """Return coefficients (terms, m) of outputs (n, m), NaN left out, and residuals (n, m)."""
     coefficients = np.zeros((terms.shape[1], outputs.shape[1]))
     left = np.full_like(outputs, np.nan)
     for k in range(outputs.shape[1]):
         good = np.isfinite(outputs[:, k])
         part = terms[good]
         square = part.T @ part + RIDGE * good.sum() * np.eye(part.shape[1])
-        # The mean itself is not drawn towards nothing.
+        # The intercept is not penalised.
         square[0, 0] -= RIDGE * good.sum()
         coefficients[:, k] = np.linalg.solve(square, part.T @ outputs[good, k])
         left[good, k] = outputs[good, k] - part @ coefficients[:, k]

@@ -1,4 +1,4 @@
-"""The extended model as a study file that ``mcstudy run`` takes."""
+"""The extended model as a study file for ``mcstudy run``."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,14 +17,25 @@ from studies.monte_carlo.schema import MonteCarloStudy
 from studies.sobol.schema import SobolStudy
 
 RUNS, REPLICATE = 1000, 100
-"""Runs of a study file that is made from data alone."""
+"""Runs of a study file made from data alone."""
 
 
 def base_study(data: Measured, choice: ModelChoice, problem: Problem, name: str) -> str:
-    """Return the study file of the model as it stands.
+    """Return the study file of the base model.
 
     The study file that the model came from, or one that samples the tested impact speeds and the
     shared unknowns.
+
+    Parameters
+    ----------
+    data : Measured
+        Measured tests.
+    choice : ModelChoice
+        The model that is diagnosed.
+    problem : Problem
+        Of the data and the model.
+    name : str
+        Name of the new study, used without a study file.
     """
     if isinstance(choice.study, MonteCarloStudy | SobolStudy | InjuryStudy):
         return choice.text
@@ -68,8 +79,16 @@ Parameters = Mapping[str, Sequence[Mapping[str, Any]]]
 
 
 def extend(text: str, parameters: Parameters) -> str:
-    """Return a study file with causes switched on, their fitted parameters uncertain."""
-    lines = ["", "# What the diagnosis added: effects, and what the tests say of their parameters."]
+    """Return a study file with causes switched on and their fitted parameters uncertain.
+
+    Parameters
+    ----------
+    text : str
+        Study file of the base model (TOML).
+    parameters : mapping
+        By cause its fitted parameters, as in ``diagnosis.json``.
+    """
+    lines = ["", "# Added by the diagnosis: effects, and the posterior of their parameters."]
     for cause, rows in parameters.items():
         lines += ["", f"[effects.{cause}]"]
         lines += [f"{row['name']} = {float(row['value'])!r}" for row in rows]

@@ -1,4 +1,4 @@
-"""Measurements that could be added, and simulations that give them."""
+"""Candidate measurements, and simulations that predict them."""
 
 import tomllib
 from importlib.resources import files
@@ -15,7 +15,7 @@ _CLASS = 1000.0
 def extras_of(
     problem: Problem, simulation: Simulation | Emulator
 ) -> list[tuple[Extra, Simulation | Emulator]]:
-    """Return the measurements that the tests lack, each with a simulation that has it."""
+    """Return the measurements that the tests lack, each with a simulation that predicts it."""
     text = files("studies.diagnosis").joinpath("measurements.toml").read_text(encoding="utf-8")
     test = problem.tests[0]
     channels = {signal.name for signal in test.signals}

@@ -1,4 +1,4 @@
-"""Which model is diagnosed: the one that the data name, or that of a study file."""
+"""Choice of the diagnosed model: the one that the data name, or that of a study file."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,14 +17,25 @@ from studies.kinds import parse_study
 
 @dataclass(frozen=True)
 class ModelChoice:
-    """The model that is diagnosed.
+    """The diagnosed model.
 
     Attributes
     ----------
-    name, options : of the model. effects : already switched on. fixed : inputs.
-    uncertain : inputs that all tests share, with what is known of them: those that the data call
-        uncertain, then those that the study file samples and the data do not state.
-    study : the study file that it comes from, with its text; None without one.
+    name : str
+        Name of the model.
+    options : dict
+        Options of the model.
+    effects : dict
+        Effects already switched on, with their parameters.
+    fixed : dict
+        Values of the fixed inputs.
+    uncertain : dict
+        Distributions of the inputs that all tests share: those that the data call uncertain, then
+        those that the study file samples and the data do not state.
+    study : CommonStudy, optional
+        The study file that it comes from.
+    text : str
+        The text of that study file, empty without one.
     """
 
     name: str
@@ -41,7 +52,10 @@ def choose_model(data: Measured, file: Path | None) -> ModelChoice:
 
     Parameters
     ----------
-    data : Measured. file : study file whose model is diagnosed, or None.
+    data : Measured
+        Measured tests.
+    file : path, optional
+        Study file whose model is diagnosed.
 
     Raises
     ------
@@ -100,7 +114,7 @@ def choose_model(data: Measured, file: Path | None) -> ModelChoice:
             )
         fixed[name] = float(value)
     uncertain = dict(header.uncertain)
-    # What differs from accident to accident is no unknown that they share.
+    # Inputs that differ between accidents are not shared unknowns.
     if isinstance(study, SampledStudy) and signals:
         stated = {*header.inputs, *header.uncertain, *header.fixed}
         uncertain |= {k: d for k, d in study.inputs.items() if k not in stated}

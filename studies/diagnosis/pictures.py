@@ -1,4 +1,4 @@
-"""What the pictures of a diagnosis show: measured, simulated and what lies between them."""
+"""Data of a diagnosis's figures: measured and simulated values, and residuals."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 SHOWN = 3
 """Tests whose pulses are shown: the lowest, the middle and the highest speed."""
 POINTS = 240
-"""Points of a curve in a picture."""
+"""Points of a curve in a figure."""
 
 
 def collect(
@@ -25,8 +25,19 @@ def collect(
 ) -> dict[str, Any]:
     """Return curves of chosen tests and residuals of all, as plain data.
 
-    The simulated curves take every test as recorded; the band is what its own nuisances and the
-    shared unknowns allow.
+    The simulated curves take every test as recorded; the band covers the test's own nuisances and
+    the shared unknowns.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem of the tests.
+    layouts : sequence of Layout
+        Measured values of each test.
+    base : Fit
+        Of the base model.
+    extended : Fit, optional
+        Of the model with the named causes.
     """
     predicted = {"base": _predicted(problem, layouts, base)}
     if extended is not None:
@@ -42,7 +53,7 @@ def collect(
 
 
 Predicted = list[tuple[Array, Array]]
-"""By test the mean and the standard deviation of what would be measured, whitened."""
+"""Mean and standard deviation of the prediction by test, whitened."""
 
 
 def _predicted(problem: Problem, layouts: Sequence[Layout], fitted: Fit) -> Predicted:
@@ -86,7 +97,7 @@ def _curves(
     for key, rows in predicted.items():
         mean, spread = rows[row]
         middle = layout.unwhiten(mean)[name]
-        # The noise of the samples is left out of the band: it is seen in the measured curve.
+        # The band leaves out the sample noise, which the measured curve shows.
         width = REACH * signal.sd * spread[_part(layout, name)]
         curves[key] = {
             "mean": middle[::step],

@@ -1,4 +1,4 @@
-"""What a fit says of the parameters of its causes."""
+"""Posterior of the parameters of the fitted causes."""
 
 from dataclasses import asdict
 from typing import Any
@@ -14,7 +14,7 @@ from mcstudy.studyfile.input_space import value_at
 def describe(problem: Problem, fitted: Fit) -> dict[str, list[dict[str, Any]]]:
     """Return by cause the parameters of a fit as plain data, with 95 % intervals.
 
-    A parameter that the form fixes has the value alone, and ``fixed`` says so.
+    A parameter that the form fixes has a value only, and ``fixed`` is true.
     """
     found: dict[str, list[dict[str, Any]]] = {}
     k = len(problem.unknowns)

@@ -26,11 +26,11 @@ Array = NDArray[np.float64]
 BIN = 5e-5
 """s: finer samples of a signal are averaged."""
 BEFORE = 1e-3
-"""s before the first sizeable sample up to which a signal counts as noise, at least."""
+"""Minimum lead (s) before the first sizeable sample; earlier samples count as noise."""
 SIZEABLE = 0.05
-"""Share of the peak from which a sample is sizeable."""
+"""Share of the peak above which a sample is sizeable."""
 MIN_COUNT = 3
-"""Tests below which a diagnosis makes no sense."""
+"""Minimum number of tests of a diagnosis."""
 
 
 def build_problem(data: Measured, choice: ModelChoice, simulation: Simulation) -> Problem:
@@ -38,13 +38,17 @@ def build_problem(data: Measured, choice: ModelChoice, simulation: Simulation) -
 
     Parameters
     ----------
-    data : Measured. choice : the model, its values below those that the data state.
-    simulation : of that model.
+    data : Measured
+        Measured tests.
+    choice : ModelChoice
+        The model; the data override its values.
+    simulation : Simulation
+        Of that model.
 
     Raises
     ------
     UserError
-        If the data do not fit the model, or hold a channel that is no evidence of its own.
+        If the data do not fit the model, or hold a channel that repeats another one.
     """
     model, header = simulation.model(()), data.header
     place = data.source / HEADER
@@ -65,8 +69,8 @@ def build_problem(data: Measured, choice: ModelChoice, simulation: Simulation) -
     )
     for name, how in refused.items():
         raise UserError(
-            f"{place}: signals.{name} is {how}: it says nothing that the accelerometer did not "
-            "say; take it out"
+            f"{place}: signals.{name} is {how}: it repeats the information of the "
+            "accelerometer; remove it"
         )
     return Problem(
         tests=tests,
@@ -201,7 +205,7 @@ def _scalars(data: Measured, model: Model, row: int) -> list[Scalar]:
         if entry.sd == 0.0:
             raise UserError(f"{place}: scalars.{name}: state its standard uncertainty sd")
         value = float(data.tests[name].iloc[row]) * scale
-        # What was not measured has no weight.
+        # Missing values have no weight.
         missing = not np.isfinite(value)
         found.append(
             Scalar(name, 0.0 if missing else value, np.inf if missing else entry.sd * scale)

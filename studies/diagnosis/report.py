@@ -71,18 +71,18 @@ def _scores(analysis: Mapping[str, Any]) -> dict[str, str]:
 
 def sections_of(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list[Section]:
     """Return the sections of the report."""
-    sections = [Section("What was found", summarise(analysis), [])]
+    sections = [Section("Findings", summarise(analysis), [])]
     captions = {
-        f"Measured and simulated {style.words(name)}: each test as recorded, bands of 95 % from "
-        "what is uncertain about a test.": figures[f"pulses_{name}"]
+        f"Measured and simulated {style.words(name)}: each test as recorded, with 95 % bands of "
+        "its uncertain inputs.": figures[f"pulses_{name}"]
         for name in analysis["pictures"]["signals"]
     }
     if "scalars" in figures:
         captions["Measured against simulated scalars."] = figures["scalars"]
     if "where" in figures:
-        captions["Where measured and simulated differ, everything uncertain allowed for."] = (
-            figures["where"]
-        )
+        captions["Residuals of measured and simulated, with all uncertainties fitted."] = figures[
+            "where"
+        ]
     place = words.location(analysis["where"], SIGNAL_UNITS)
     sections.append(Section("Where", [place], [], captions))
     if analysis["effects"]:
@@ -90,14 +90,14 @@ def sections_of(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list
     if analysis["gain"]:
         sections.append(_gain(analysis, figures))
     sections.append(_visible(analysis))
-    sections.append(Section("How it was done", _method(analysis), [_statistics(analysis)]))
+    sections.append(Section("Method", _method(analysis), [_statistics(analysis)]))
     if analysis["data"].get("notes"):
-        sections.append(Section("What was read", analysis["data"]["notes"]))
+        sections.append(Section("Notes on the data", analysis["data"]["notes"]))
     return sections
 
 
 def summarise(analysis: Mapping[str, Any]) -> list[str]:
-    """Return the answer in words."""
+    """Return the answer in sentences."""
     lines = words.answer(analysis)
     lines += words.gain_words(analysis["gain"])
     lines += words.conclusion_words(analysis["conclusions"])
@@ -114,12 +114,12 @@ def _best_extra(analysis: Mapping[str, Any]) -> str:
     best = analysis["worth"][0]
     if analysis["ambiguous"] and best["separation"] is not None:
         return (
-            f"What would help most: {best['title']}; the causes named would then differ by "
-            f"{number(best['separation'], 2)} log units."
+            f"Most informative measurement to add: {best['title']}; the named causes would "
+            f"differ by {number(best['separation'], 2)} log units."
         )
     return (
-        f"What would help most: {best['title']}; causes would be seen "
-        f"{number(best['visibility'], 2)} times as clearly, on average over the catalogue."
+        f"Most informative measurement to add: {best['title']}; it would make causes "
+        f"{number(best['visibility'], 2)} times as detectable, on average over the catalogue."
     )
 
 
@@ -140,24 +140,26 @@ def _why(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> Section:
         rows,
     )
     lines = [
-        "Every cause of the catalogue was tried over its prior, in each of its forms; those that "
-        "might win were fitted with all uncertain inputs. Evidence is above that of the model as "
-        "it stands, in natural log units, averaged over the forms of a cause. Causes within 3 log "
-        "units of the best cannot be told apart; below 3 log units none is named."
+        "Every cause of the catalogue was scanned over its prior, in each of its forms; the "
+        "competitive ones were fitted with all uncertain inputs. Log evidence is relative to the "
+        "base model, in natural log units, averaged over the forms of a cause. Causes within 3 log "
+        "units of the best are indistinguishable; below 3 log units no cause is named."
     ]
     behind = [
         n for n in analysis["titles"] if n not in {row["name"] for row in analysis["effects"]}
     ]
     if behind:
         names = ", ".join(name.replace("_", " ") for name in behind)
-        lines.append(f"Far behind, or without a trace in what was measured: {names}.")
+        lines.append(f"Much less likely, or without effect on the measurements: {names}.")
     left = analysis["remainder"]
     if left is not None:
         lines.append(
-            f"What was named explains {100.0 * left['share']:.0f} % of the misfit; what is left "
-            f"has {words.probability(left['p_value'])}."
+            f"The named causes explain {100.0 * left['share']:.0f} % of the misfit; the "
+            f"remaining misfit has {words.probability(left['p_value'])}."
         )
-    return Section("Why", lines, [table], {"Evidence of each cause.": figures["evidence"]})
+    return Section(
+        "Candidate causes", lines, [table], {"Evidence of each cause.": figures["evidence"]}
+    )
 
 
 def _gain(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> Section:
@@ -178,14 +180,14 @@ def _gain(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> Section:
     if "gain" in figures:
         shown["Gain on held-out tests, with 95 % intervals."] = figures["gain"]
     if "conclusions" in figures:
-        shown["What the extension changes in the study's conclusions."] = figures["conclusions"]
+        shown["Effect of the extension on the study's conclusions."] = figures["conclusions"]
     lines = [
         "Whole tests were held out, a sixth at a time (inside), and the fastest quarter at once "
         "(beyond). The Gaussian process corrects the base model without naming a cause. The log "
         "score is better when larger, all others when smaller; intervals are of a paired bootstrap "
         "over tests."
     ]
-    return Section("What the extension gains", lines, [table], shown)
+    return Section("Predictive gain of the extension", lines, [table], shown)
 
 
 def _visible(analysis: Mapping[str, Any]) -> Section:
@@ -195,21 +197,21 @@ def _visible(analysis: Mapping[str, Any]) -> Section:
     ]
     tables = [
         Table(
-            "Smallest size of each cause that would have been seen with 80 % power.",
-            ["cause", "parameter", "smallest size"],
+            "Minimum detectable effect of each cause with 80 % power.",
+            ["cause", "parameter", "minimum detectable"],
             rows,
         )
     ]
     if analysis["worth"]:
         tables.append(
             Table(
-                "Measurements that could be added.",
-                ["measurement", "separation [log units]", "clearer by the factor"],
+                "Value of information of further measurements.",
+                ["measurement", "separation [log units]", "detectability factor"],
                 [[w["title"], number(w["separation"], 2), number(w["visibility"], 3)]
                  for w in analysis["worth"]],
             )
         )  # fmt: skip
-    return Section("What could have been seen", [], tables)
+    return Section("Minimum detectable effects", [], tables)
 
 
 def _statistics(analysis: Mapping[str, Any]) -> Table:
@@ -218,7 +220,7 @@ def _statistics(analysis: Mapping[str, Any]) -> Table:
         for name, entry in analysis["statistics"].items()
     ]
     return Table(
-        "Four ways of looking for a misfit.",
+        "Four statistics of misfit.",
         ["kind of misfit", "statistic", "p-value"],
         rows,
     )
@@ -227,20 +229,20 @@ def _statistics(analysis: Mapping[str, Any]) -> Table:
 def _method(analysis: Mapping[str, Any]) -> list[str]:
     r = analysis["repeatability"]
     return [
-        "The model was fitted with everything that is uncertain: shared unknowns, recorded inputs "
-        "within their uncertainty, time origin and offset of each test, and a repeatability of the "
-        f"pulse from test to test ({100.0 * r['level']:.1f} % of its level, "
+        "The fit includes all uncertainties: shared unknowns, recorded inputs within their "
+        "uncertainty, time origin and offset of each test, and the test-to-test repeatability of "
+        f"the pulse ({100.0 * r['level']:.1f} % of its level, "
         f"{100.0 * r['shape']:.1f} % of its shape).",
-        "A misfit is looked for in four ways; the smallest of their p-values is calibrated on data "
-        "that the model makes.",
-        "With the signs of whole tests flipped instead of a covariance the catalogue's p-value is "
+        "Four statistics test for misfit; the smallest of their p-values is calibrated on data "
+        "simulated with the model.",
+        "With sign flips of whole tests instead of a covariance, the catalogue's p-value is "
         f"{number(analysis['flip_p_value'], 2)}; it cannot be small where few tests carry the "
         "misfit.",
     ]
 
 
 def table_of(analysis: Mapping[str, Any]) -> list[Table]:
-    """Return what the command line prints beside the sentences."""
+    """Return the tables that the command line prints after the sentences."""
     if not analysis["effects"]:
         return [_visible(analysis).tables[0]]
     return [

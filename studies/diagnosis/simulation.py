@@ -1,4 +1,4 @@
-"""Simulated tests: a model of the registry seen through the channels that were measured."""
+"""Simulated tests: a model of the registry, reduced to the measured channels."""
 
 from collections.abc import Collection, Mapping
 from typing import Any
@@ -22,13 +22,20 @@ def channel_units(model: Model, names: Collection[str]) -> dict[str, str]:
 
 
 class Simulation:
-    """Runs a model as the tests saw it.
+    """Simulates tests: runs of a model reduced to the measured channels.
 
     Parameters
     ----------
-    name, options : of the model.
-    filters : channel frequency class by signal, 0 for none. scalars : outputs that were measured.
-    effects : switched on from the start.
+    name : str
+        Name of the model.
+    options : mapping
+        Options of the model.
+    filters : mapping
+        Channel frequency class by signal, 0 for none.
+    scalars : collection of str
+        Measured outputs.
+    effects : mapping, optional
+        Effects switched on from the start, with their parameters.
     """
 
     def __init__(
@@ -88,7 +95,7 @@ class Simulation:
             group, _, channel = self._seen_as(name, run.inputs).partition("_")
             history = run.histories[group]
             signal = history.channels[channel]
-            # What the model filters has passed the measured class already.
+            # Channels that the model filters already have the measured class.
             filtered = model.channels.get(name, Channel()).filter_option
             if channel_class > 0.0 and not filtered:
                 rate = 1.0 / float(history.time[1] - history.time[0])

@@ -39,7 +39,7 @@ ANSWER = "diagnosis.json"
 EXTENDED = "extended.toml"
 BASE = "base.toml"
 RIVALS = 3
-"""Rivals of the best cause from which extra measurements are to tell it."""
+"""Rivals of the best cause from which extra measurements should separate it."""
 
 
 def diagnose(
@@ -56,13 +56,20 @@ def diagnose(
 
     Parameters
     ----------
-    source : folder of measured data or of ISO-MME tests.
-    folder : where the diagnosis goes.
-    model_config : study file whose model is diagnosed; by default the model that the data name.
-    channels : of ISO-MME tests, which to take; see
-        ``mcstudy.measurement.isomme.head_acceleration``.
-    seed : of the simulated data sets. workers : processes, -1 for one a core.
-    quiet : print no progress.
+    source : path or str
+        Folder of measured data or of ISO-MME tests.
+    folder : ResultsFolder
+        Folder of the diagnosis.
+    model_config : path, optional
+        Study file whose model is diagnosed; by default the model that the data name.
+    channels : sequence of str
+        Channels to take from ISO-MME tests; see ``mcstudy.measurement.isomme.head_acceleration``.
+    seed : int
+        Seed of the simulated data sets.
+    workers : int
+        Processes, -1 for one per core.
+    quiet : bool
+        No progress line.
 
     Returns
     -------
@@ -95,7 +102,7 @@ def diagnose(
 
 
 def simulation_of(data: Measured, choice: ModelChoice) -> Simulation:
-    """Return the simulation of what was measured."""
+    """Return the simulation of the measured channels and scalars."""
     filters = {name: entry.channel_class for name, entry in data.header.signals.items()}
     return Simulation(
         choice.name, choice.options, filters, list(data.header.scalars), choice.effects
@@ -196,7 +203,7 @@ def _effect(problem: Problem, candidate: Candidate, finding: Finding) -> dict[st
 
 
 def quantities(data: Measured) -> Mapping[str, tuple[str, str, Quantity]]:
-    """Return what is computed of the signals to score predictions: unit, signal, function."""
+    """Return the signal quantities that score predictions: unit, signal, function."""
     found: dict[str, tuple[str, str, Quantity]] = {}
     if "head_acceleration" in data.header.signals:
         found["hic15"] = ("1", "head_acceleration", _hic15)

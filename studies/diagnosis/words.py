@@ -1,4 +1,4 @@
-"""A diagnosis in plain words."""
+"""Sentences of a diagnosis."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -9,20 +9,19 @@ from mcstudy.text import capital, interval, number, percent, quantity, unit
 
 SHOWN_UNITS = {"m": ("mm", 1e3), "rad": ("deg", 57.29577951308232), "m/N": ("mm/kN", 1e6),
                "N/m": ("kN/m", 1e-3), "N": ("kN", 1e-3)}  # fmt: skip
-"""Units in which people read parameters, and their factor."""
+"""Display units of parameters, and their factors."""
 
 SENTENCES = {
-    "hood_bottoming": "The hood hits something {clearance} below it.",
+    "hood_bottoming": "The hood hits a structure {clearance} below it.",
     "hood_yield": "The hood yields beyond {force}.",
     "rate_dependent_hood": "The hood is stiffer when struck faster.",
     "hood_inertia": "The hood's own mass, {mass}, is set in motion.",
-    "unloading_slope": "The hood springs back otherwise than assumed: factor {factor} on its "
-    "unloading slope.",
-    "skin_compliance": "The headform's skin gives way by {compliance}.",
+    "unloading_slope": "The hood's unloading slope is {factor} times the assumed one.",
+    "skin_compliance": "The headform's skin has a compliance of {compliance}.",
     "hood_force_scale": "The forces are {factor} times those of the hood's curve.",
     "sensor_gain": "The accelerometer reads {factor} times the true acceleration.",
-    "sensor_offset": "The accelerometer is off zero by {offset}.",
-    "sensor_saturation": "The accelerometer does not read beyond {limit}.",
+    "sensor_offset": "The accelerometer has a zero offset of {offset}.",
+    "sensor_saturation": "The accelerometer saturates at {limit}.",
     "sensor_filter": "The signal went through channel frequency class {channel_class}, not the one "
     "stated.",
     "time_scale": "The recorder's clock shows {factor} times the true time.",
@@ -32,22 +31,22 @@ SENTENCES = {
     "late_braking": "The car brakes {delay} after first contact.",
     "road_slope": "The road falls by {angle} along the travel.",
     "muscle_tone": "The muscles were tensed: {factor} times the resistance of neck and joints.",
-    "shoulder_compliance": "The shoulder girdle gives way {factor} times as far.",
+    "shoulder_compliance": "The shoulder girdle is {factor} times as compliant.",
     "braced_posture": "The person was braced, {share} of the way.",
     "brake_dive": "The nose dives {angle} more than assumed.",
-    "restitution": "The road gives back {factor} times the energy assumed.",
+    "restitution": "The road returns {factor} times the assumed energy.",
 }
 
 
 def _shown_unit(name: str, value: float) -> tuple[str, float]:
-    """Return the unit in which people read a value, and its factor."""
+    """Return the display unit of a value, and its factor."""
     if name == "m" and abs(value) >= 1.0:
         return name, 1.0
     return SHOWN_UNITS.get(name, (name, 1.0))
 
 
 def shown(row: Mapping[str, Any]) -> str:
-    """Return a parameter with its interval, in the unit in which people read it."""
+    """Return a parameter with its interval, in its display unit."""
     name, factor = _shown_unit(row.get("unit", "1"), float(row["value"]))
     value, low, high = (factor * float(row[key]) for key in ("value", "low", "high"))
     half = 0.5 * (high - low)
@@ -63,7 +62,17 @@ def _with_error(value: float, half: float) -> str:
 
 
 def sentence(cause: str, parameters: Sequence[Mapping[str, Any]], title: str) -> str:
-    """Return what a named cause says, with its fitted numbers."""
+    """Return the sentence of a named cause with its fitted parameters.
+
+    Parameters
+    ----------
+    cause : str
+        Name of the cause.
+    parameters : sequence of mapping
+        Fitted parameters, as in ``diagnosis.json``.
+    title : str
+        Title of the cause, used where it has no sentence.
+    """
     pattern = SENTENCES.get(cause)
     if pattern is None:
         return f"{capital(title)}."
@@ -81,29 +90,29 @@ def answer(found: Mapping[str, Any]) -> list[str]:
     tests = found["data"]["tests"]
     if found["adequate"]:
         return [
-            f"The model explains the {tests} tests within what is uncertain ({p}). What follows "
-            "says what could have been seen."
+            f"The model explains the {tests} tests within their uncertainty ({p}). The minimum "
+            "detectable effects follow."
         ]
     lines = [f"The model does not explain the {tests} tests ({p})."]
     titles = found["titles"]
     if found["cause"] == "unexplained":
         lines.append(f"No cause of the catalogue explains it: {found['why']}.")
         if found["drift"]["log_evidence"] > 3.0:
-            lines.append(f"Look for a slow change: {_drift(found['drift']['name'])}.")
+            lines.append(f"Check for a drift: {_drift(found['drift']['name'])}.")
         return lines
     parameters = found["parameters"]
     lines += [sentence(cause, rows, titles[cause]) for cause, rows in parameters.items()]
     if found["ambiguous"]:
         others = [titles[name] for name in found["ambiguous"] if name != found["cause"]]
         lines.append(
-            f"But the data cannot tell this from: {'; '.join(others)}. What would: "
+            f"But the data cannot distinguish this from: {'; '.join(others)}. To separate them: "
             f"{found['separated_by'][found['cause']]}."
         )
     if found["second_ambiguous"]:
         names = [titles[n] for n in found["second_ambiguous"] if n != found["second_cause"]]
-        lines.append(f"The second cause cannot be told from: {'; '.join(names)}.")
+        lines.append(f"The second cause is indistinguishable from: {'; '.join(names)}.")
     if found["flagged"]:
-        lines.append("Something remains that this does not explain.")
+        lines.append("A misfit remains that these causes do not explain.")
     return lines
 
 
@@ -117,7 +126,7 @@ def _drift(name: str) -> str:
 
 
 def location(where: Mapping[str, Any], units: Mapping[str, str]) -> str:
-    """Return where the misfit is, in a sentence."""
+    """Return a sentence on the location of the misfit."""
     region = where["largest"]
     more = "above" if region["z"] > 0.0 else "below"
     when = ""
@@ -136,7 +145,7 @@ def location(where: Mapping[str, Any], units: Mapping[str, str]) -> str:
 
 
 def gain_words(gains: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return what the extension gains on held-out tests."""
+    """Return sentences on the gain of the extension on held-out tests."""
     lines = []
     scores = dict.fromkeys(g["score"] for g in gains if g["score"].startswith("crps_"))
     for score in scores:
@@ -148,18 +157,18 @@ def gain_words(gains: Sequence[Mapping[str, Any]]) -> list[str]:
             better = d["value"] >= 0.0
             low, high = sorted((abs(d["low"]), abs(d["high"])))
             if d["low"] < 0.0 < d["high"]:
-                spread = f"{d['low']:.0f} to {d['high']:.0f} %: it may be none"
+                spread = f"{d['low']:.0f} to {d['high']:.0f} %: consistent with zero"
             else:
                 spread = f"{low:.0f} to {high:.0f} %"
             lines.append(
-                f"{capital(entry['region'])} the speeds used, predictions of {name} are "
+                f"{capital(entry['region'])} the tested speeds, predictions of {name} are "
                 f"{abs(d['value']):.0f} % {'better' if better else 'worse'} (CRPS, {spread})."
             )
     return lines
 
 
 def conclusion_words(found: Mapping[str, Any] | None) -> list[str]:
-    """Return what the extension changes in the study's conclusions."""
+    """Return sentences on the effect of the extension on the study's conclusions."""
     if found is None:
         return []
     base, extended = found["base"], found["extended"]
@@ -169,15 +178,15 @@ def conclusion_words(found: Mapping[str, Any] | None) -> list[str]:
         return words(max(part["drivers"], key=lambda n: part["drivers"][n]["value"]))
 
     return [
-        f"P(HIC15 > {limit}): {percent(base['exceedance'])} with the model as it stands, "
-        f"{percent(extended['exceedance'])} with the extended one; median HIC15 "
+        f"P(HIC15 > {limit}): {percent(base['exceedance'])} with the base model, "
+        f"{percent(extended['exceedance'])} with the extended model; median HIC15 "
         f"{interval(base['median'])} and {interval(extended['median'])}.",
-        f"What drives HIC15 most: {first(base)} before, {first(extended)} after.",
+        f"Most influential input on HIC15: {first(base)} before, {first(extended)} after.",
     ]
 
 
 def visible_words(entry: Mapping[str, Any]) -> str:
-    """Return the smallest size of a cause that would have been seen."""
+    """Return the minimum detectable effect of a cause."""
     value, none = entry["value"], entry["none"]
     if value is None:
         return "no size within the prior"

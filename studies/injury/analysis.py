@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 CASES = "cases.parquet"
 """Table of the cases of an injury study, in its folder."""
 PREDICTORS = ("hic15", "impact_speed", "throw_distance", "wad")
-"""What the AIS is set against, where a model has it."""
+"""Predictors of the AIS, where a model has them."""
 
 
 def risk_column(mechanism: str, level: int) -> str:
@@ -39,6 +39,15 @@ def outcomes_of(
     """Return the runs with their risks by mechanism and level and a drawn AIS of the head.
 
     The draw of a run depends on the study's seed and its run id, so that scenarios share it.
+
+    Parameters
+    ----------
+    study : InjuryStudy
+        Checked study file.
+    runs : DataFrame
+        Complete runs of all cells.
+    functions : mapping
+        Risk functions by name.
     """
     age = ages_of(study, runs)
     outputs = {name: runs[name].to_numpy(dtype=float) for name in
@@ -70,7 +79,14 @@ def analyse(
 
     Parameters
     ----------
-    study, model, functions : of the cases. cases : of ``outcomes_of``.
+    study : InjuryStudy
+        Checked study file.
+    model : Model
+        Model of the runs.
+    cases : DataFrame
+        From ``outcomes_of``.
+    functions : mapping
+        Risk functions by name.
 
     Raises
     ------
@@ -118,7 +134,14 @@ def population(
 
     Parameters
     ----------
-    part : runs of one scenario. values : (n,) of each. shares : of the fronts, adding up to one.
+    study : InjuryStudy
+        Checked study file.
+    part : DataFrame
+        Runs of one scenario.
+    values : (n,) array
+        Probability of each run.
+    shares : mapping
+        Share of each car front, adding up to one.
     """
     by_batch = np.asarray(_by_batch(study, part, values, shares), dtype=float)
     return _within_bounds(between_replicates(by_batch, _mean(part, values, shares)))
@@ -131,7 +154,7 @@ def _within_bounds(estimate: Estimate) -> Estimate:
 
 
 def weights_of(part: pd.DataFrame, shares: Mapping[str, float]) -> Array:
-    """Return by how much each run counts: the share of its front over the front's runs."""
+    """Return the weight of each run: the share of its front over the front's runs."""
     counts = part["front"].value_counts()
     each = {name: share / counts[name] for name, share in shares.items() if name in counts}
     return np.asarray(part["front"].map(each), dtype=float)
@@ -197,7 +220,7 @@ def _outcome(study: InjuryStudy, part: pd.DataFrame, shares: Mapping[str, float]
 def _differences(
     study: InjuryStudy, reference: pd.DataFrame, part: pd.DataFrame, shares: Mapping[str, float]
 ) -> dict[str, Any]:
-    """Return what a scenario changes, level by level; the same draws make it sharp."""
+    """Return the change by a scenario per level; common random numbers reduce its variance."""
     found = {}
     for level in LEVELS:
         batches = [_by_batch(study, p, _head(p, level), shares) for p in (part, reference)]
@@ -240,7 +263,7 @@ def _associations(study: InjuryStudy, model: Model, part: pd.DataFrame) -> dict[
 
 
 def _judged_by(study: InjuryStudy, functions: Mapping[str, RiskFunction]) -> list[str]:
-    """Return what the limit is held against: the head, and each mechanism of the limit's output."""
+    """Return what the limit is judged by: the head, and each mechanism of the limit's output."""
     own = [
         name
         for name, entry in study.mechanisms.items()
@@ -254,8 +277,7 @@ def _limit(
 ) -> dict[str, Any]:
     """Return the limit as a classifier, with intervals between the parts of the design.
 
-    It is none, and empty, where all runs are alike in their output or injured with certainty or
-    never.
+    It is empty where all runs have the same output, or are injured with certainty or never.
     """
     limit = study.limit
     stimulus = part[limit.output].to_numpy(dtype=float)
@@ -297,7 +319,7 @@ def _by_function(
     functions: Mapping[str, RiskFunction],
     shares: Mapping[str, float],
 ) -> dict[str, Any]:
-    """Return the mean risk by each risk function alone: what the choice of one decides."""
+    """Return the mean risk by each risk function alone: the model-form uncertainty."""
     age = ages_of(study, reference)
     found = {}
     for name, function in functions.items():
@@ -320,7 +342,7 @@ def _observed(
     functions: Mapping[str, RiskFunction],
     shares: Mapping[str, float],
 ) -> dict[str, Any]:
-    """Return how probable the injuries of the real case were."""
+    """Return the probabilities of the injuries of the real case."""
     entries, risks = [], []
     age = ages_of(study, reference)
     for item in study.observed:

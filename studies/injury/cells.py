@@ -10,7 +10,7 @@ from studies.monte_carlo.schema import MonteCarloStudy
 
 @dataclass(frozen=True)
 class Cell:
-    """One scenario with one car front: a Monte Carlo study, and what the scenario fixes in it."""
+    """One scenario with one car front: a Monte Carlo study, and the inputs that it fixes."""
 
     scenario: str
     front: str

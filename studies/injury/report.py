@@ -1,4 +1,4 @@
-"""The report of an injury study: outcomes, limits and curves, in words, tables and pictures."""
+"""The report of an injury study: outcomes, limits and curves, in text, tables and figures."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -15,7 +15,7 @@ from studies.injury.analysis import ages_of, proportional
 from studies.injury.schema import REFERENCE, InjuryStudy
 
 FEW = 1000.0
-"""Impacts that counts of injured are given for."""
+"""Number of impacts to which counts of injured refer."""
 
 
 def draw(
@@ -24,7 +24,19 @@ def draw(
     analysis: Mapping[str, Any],
     functions: Mapping[str, RiskFunction],
 ) -> dict[str, Any]:
-    """Return the study's figures by file name."""
+    """Return the study's figures by file name.
+
+    Parameters
+    ----------
+    study : InjuryStudy
+        Checked study file.
+    cases : DataFrame
+        Runs with risks and AIS.
+    analysis : mapping
+        As in ``analysis.json``.
+    functions : mapping
+        Risk functions by name.
+    """
     scenarios = analysis["scenarios"]
     reference = cases[cases["scenario"] == REFERENCE]
     bars = {entry["title"]: entry["ais"] for entry in scenarios.values()}
@@ -97,7 +109,19 @@ def sections_of(
     figures: Mapping[str, Any],
     functions: Mapping[str, RiskFunction],
 ) -> list[Section]:
-    """Return the sections of the report."""
+    """Return the sections of the report.
+
+    Parameters
+    ----------
+    study : InjuryStudy
+        Checked study file.
+    analysis : mapping
+        As in ``analysis.json``.
+    figures : mapping
+        Figures by file name.
+    functions : mapping
+        Risk functions by name.
+    """
     scenarios = analysis["scenarios"]
 
     def one(name: str, caption: str) -> dict[str, Any]:
@@ -108,12 +132,12 @@ def sections_of(
             "Outcomes", summarise(analysis), _outcome_tables(analysis),
             one("ais", "Distribution of the AIS of the head, by scenario and by mechanism."),
         ),
-        Section("Observed injuries, and the speed that would have halved the risk",
+        Section("Observed injuries, and the speed that halves the risk",
                 _observed_said(analysis), _halved_tables(analysis)),
         Section(
-            "The choice of the risk function",
-            ("Which published function is right nobody knows; the choice is an uncertain input. "
-             "Each alone, over the same runs:",),
+            "Model-form uncertainty of the risk function",
+            ("Which published function is right is unknown. Mean risk by each function alone, over "
+             "the same runs:",),
             [_function_table(analysis)],
             {
                 f"Published risk of {style.words(name.removeprefix('risk_'))} by AIS level at the "
@@ -129,16 +153,16 @@ def sections_of(
                 "curve (as if the runs were independent).")
             | one("roc", "Sensitivity over false alarms for all limits."),
         ),
-        Section("What goes with the AIS", (
+        Section("Rank correlations with the AIS", (
             "Rank correlations with the drawn AIS of the head, and the factor on the odds of a "
             "worse AIS for one standard deviation (proportional-odds regression, all predictors "
             "together). Intervals are 95 %.",),
             [_association_table(entry) for entry in scenarios.values()]),
         Section("Risk against impact speed", _speed_said(analysis), (), one(
-            "speed", "Means over bins of the speed, made to rise, with 95 % bands. Grey: published "
-            "curves, for adults and other injuries, to compare the shape.")),
+            "speed", "Means over bins of the speed (isotonic regression), with 95 % bands. Grey: "
+            "published curves, for adults and other injuries, to compare the shape.")),
         Section(
-            "How the numbers came about",
+            "Method and sampling uncertainty",
             [*_honesty(study, functions), *failures_said(analysis)],
             [status_table(analysis)],
             one("failures", "Share of failed runs in each tenth of each input."),
@@ -147,7 +171,7 @@ def sections_of(
 
 
 def summarise(analysis: Mapping[str, Any]) -> list[str]:
-    """Return the outcome in words."""
+    """Return the outcome in sentences."""
     level = str(analysis["limit"]["level"])
     scenarios = analysis["scenarios"]
     first = scenarios[REFERENCE]["at_least"][level]
@@ -163,16 +187,16 @@ def summarise(analysis: Mapping[str, Any]) -> list[str]:
 
 
 def _changed(change: Mapping[str, float | None]) -> str:
-    """Say how many fewer or more."""
+    """Return the change in numbers of impacts."""
     value, low, high, relative = (change[k] for k in ("value", "low", "high", "relative"))
     if not value:
-        return "no difference that can be told from none"
+        return "no difference distinguishable from zero"
     verb = "fewer" if value < 0.0 else "more"
     percentage = "" if relative is None else f" ({100.0 * relative:+.0f} %)"
     if low is None or high is None:
         return f"{_count({'value': abs(value), 'low': None, 'high': None})} {verb}{percentage}"
     if low <= 0.0 <= high:
-        return "no difference that can be told from none"
+        return "no difference distinguishable from zero"
     ends = sorted((abs(low), abs(high)))
     size = {"value": abs(value), "low": ends[0], "high": ends[1]}
     return f"{_count(size)} {verb}{percentage}"
@@ -227,7 +251,7 @@ def _outcome_tables(analysis: Mapping[str, Any]) -> list[Table]:
     changed = {e["title"]: e["difference"] for e in scenarios.values() if "difference" in e}
     if changed:
         tables.append(
-            _by_level("Difference to the study as it stands, with the same draws.", changed)
+            _by_level("Difference from the reference scenario, with the same draws.", changed)
         )
     if len(analysis["fronts"]) > 1:
         level = analysis["limit"]["level"]
@@ -255,14 +279,14 @@ def _observed_said(analysis: Mapping[str, Any]) -> list[str]:
         label = capital(entry["label"])
         lines.append(
             f"{label} (AIS {entry['level']}): its probability was "
-            f"{percent(entry['probability'])}; over nine runs in ten it lies between "
+            f"{percent(entry['probability'])}; in the central 90 % of the runs between "
             f"{_whole(low)} and {_whole(high)} %." + (f" By risk function: {by}." if by else "")
         )
     if "all" in observed:
         both = observed["all"]
         lines.append(
             f"All of them together: {percent(both['independent'])} if each run's risks are "
-            f"independent, {percent(both['dependent'])} if they go together."
+            f"independent, {percent(both['dependent'])} if they are fully dependent."
         )
     return lines
 
@@ -276,10 +300,10 @@ def _halved_tables(analysis: Mapping[str, Any]) -> list[Table]:
         for name, entry in speed["halved"].items()
     ]
     caption = (
-        "The impact speed that would have halved the risk; the median of the case is "
+        "The impact speed that halves the risk; the median of the case is "
         f"{number(speed['reference_speed'])} km/h. '–': beyond the speeds of the study."
     )
-    return [Table(caption, ["injury", "risk as it stands", "halved at [km/h] (95 %)"], rows)]
+    return [Table(caption, ["injury", "reference risk", "halved at [km/h] (95 %)"], rows)]
 
 
 def _function_table(analysis: Mapping[str, Any]) -> Table:
@@ -290,11 +314,11 @@ def _function_table(analysis: Mapping[str, Any]) -> Table:
         for entry in analysis["functions"].values()
     ]  # fmt: skip
     head = ["risk function", "read", *(f"AIS {k}+" for k in range(1, 7))]
-    return Table("Mean risk in the study as it stands (95 % interval of the mean).", head, rows)
+    return Table("Mean risk in the reference scenario (95 % interval of the mean).", head, rows)
 
 
 def _judged(analysis: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """Return the limit's judgements by scenario and what it is held against."""
+    """Return the limit's ratings by scenario and injury."""
     level = analysis["limit"]["level"]
     return {
         f"AIS {level}+ {style.words(words)}, {entry['title']}": judged
@@ -316,12 +340,12 @@ def _limit_said(analysis: Mapping[str, Any]) -> list[str]:
             said += (
                 f"; as a test of AIS {limit['level']}+ of the head the limit finds "
                 f"{percent(judged['sensitivity'])} of the injured; by these risk functions the "
-                f"best one (Youden) would be {number(judged['best'])}"
+                f"optimal limit (Youden) is {number(judged['best'])}"
             )
         else:
             said += (
-                f"; as a test of AIS {limit['level']}+ of the head the limit says nothing, as the "
-                "runs cannot be told apart"
+                f"; as a test of AIS {limit['level']}+ of the head the limit cannot be rated, as "
+                "the runs do not differ"
             )
         lines.append(said + ".")
     return lines
@@ -336,8 +360,8 @@ def _limit_table(analysis: Mapping[str, Any]) -> Table:
     ]  # fmt: skip
     head = ["test of", "sensitivity", "specificity", "PPV (risk above)",
             "NPV (uninjured below)", "ROC area", "best limit"]  # fmt: skip
-    return Table("The limit as a classifier (95 % intervals); outcomes count by their "
-                 "probability.", head, rows)  # fmt: skip
+    return Table("The limit as a classifier (95 % intervals); outcomes are weighted by "
+                 "their probability.", head, rows)  # fmt: skip
 
 
 def _association_table(entry: Mapping[str, Any]) -> Table:
@@ -349,9 +373,9 @@ def _association_table(entry: Mapping[str, Any]) -> Table:
     ]  # fmt: skip
     caption = f"{entry['title']}: {found['runs']:,} runs."
     if len(found["levels"]) == 1:
-        caption += f" All outcomes are AIS {found['levels'][0]}, so nothing goes with them."
+        caption += f" All outcomes are AIS {found['levels'][0]}, so there is no correlation."
     elif found["constant"]:
-        caption += f" What does not vary: {', '.join(map(style.words, found['constant']))}."
+        caption += f" Constant: {', '.join(map(style.words, found['constant']))}."
     if found["odds"]:
         caption += f" The regression explains {100.0 * found['explained']:.0f} % (McFadden)."
     return Table(caption, ["", "Spearman's rho", "Kendall's tau", "odds ratio per sd"], rows)
@@ -369,21 +393,20 @@ def _speed_said(analysis: Mapping[str, Any]) -> list[str]:
 
 def _honesty(study: InjuryStudy, functions: Mapping[str, RiskFunction]) -> list[str]:
     together = (
-        "The head takes the larger risk of its mechanisms (they go together), which is the least "
-        "that it can be."
+        "The head takes the larger risk of its mechanisms (full dependence), which is a lower "
+        "bound."
         if study.together == "dependent"
-        else "The mechanisms are taken as independent, which is the most that the risk can be."
+        else "The mechanisms are taken as independent, which is an upper bound."
     )
     lines = [
         "Every run's risk of AIS k or worse is the mean of the risk functions of a mechanism with "
-        "the weights of the study file; a function without a level leaves it to the others. "
+        "the weights of the study file; a function without a level is left out for that level. "
         + together,
-        "Adult functions are carried to the child by the age: HIC by the factors of the Q dummies, "
+        "Adult functions are scaled to the child by age: HIC by the factors of the Q dummies, "
         "rotation by the mass of the brain to the power 2/3 (acceleration) or 1/3 (velocity). No "
         "contact of the head with the car counts as no risk.",
-        "Intervals are 95 % t intervals between the independent parts of the design. They count "
-        "the sampling error only: not what the model gets wrong, and not whether the risk "
-        "functions are right.",
+        "Intervals are 95 % t intervals between the independent parts of the design. They cover "
+        "the sampling uncertainty only, not errors of the model or of the risk functions.",
     ]
     lines += [f"{f.title}: {f.source} [{f.label}]" for f in functions.values()]
     return lines

@@ -16,27 +16,27 @@ from mcstudy.studyfile.schema import (
     check_folder_name,
 )
 
-REFERENCE, AS_IT_STANDS = "reference", "as it stands"
-"""Name and title of the scenario of an injury study that changes nothing."""
+REFERENCE, AS_IT_STANDS = "reference", "reference scenario"
+"""Name and title of the scenario of an injury study without changes."""
 HEAD = "head"
 """All mechanisms of injury together."""
 
 
 class MechanismChoice(StudyTable):
-    """``[mechanisms.<name>]``: risk functions between which nobody can choose, with weights."""
+    """``[mechanisms.<name>]``: alternative risk functions with weights."""
 
     functions: Annotated[dict[str, Annotated[FiniteFloat, Field(gt=0.0)]], Field(min_length=1)]
 
 
 class Front(StudyTable):
-    """``[fronts.<name>]``: a car front, the share of impacts that it has, its model options."""
+    """``[fronts.<name>]``: a car front, its share of the impacts and its model options."""
 
     share: Annotated[FiniteFloat, Field(gt=0.0)] = 1.0
     options: Options = {}
 
 
 class Scenario(StudyTable):
-    """``[scenarios.<name>]``: what is changed against the study as it stands."""
+    """``[scenarios.<name>]``: changes against the reference scenario."""
 
     title: Annotated[str, Field(min_length=1)]
     inputs: dict[str, Distribution] = {}
@@ -86,7 +86,9 @@ class InjuryStudy(CommonStudy, Limits):
             if titles.count(title) > 1:
                 raise ValueError(f"scenarios: two have the title {title!r}")
         if REFERENCE in self.scenarios:
-            raise ValueError(f"scenarios.{REFERENCE}: this name is the study's as it stands")
+            raise ValueError(
+                f"scenarios.{REFERENCE}: this name is that of the study without changes"
+            )
         for name, scenario in self.scenarios.items():
             for key in scenario.fixed:
                 if key in scenario.inputs:

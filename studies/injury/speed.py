@@ -1,4 +1,4 @@
-"""Risk against impact speed, and the speed that would have halved it."""
+"""Risk against impact speed, and the speed that halves it."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -17,13 +17,13 @@ Array = NDArray[np.float64]
 
 SPEED = "impact_speed"
 BINS = 24
-"""Parts of equal width along the speed, between its outermost hundredths (assumed)."""
+"""Bins of equal width along the speed, between its 1 % and 99 % quantiles (assumed)."""
 MIN_IN_BIN = 10
 RESAMPLES = 400
 HEAD_LEVELS = (2, 3, 5)
-"""AIS levels of the head that are followed."""
+"""AIS levels of the head with a curve."""
 MIN_COUNT = 240
-"""Runs below which no curve is drawn (assumed)."""
+"""Minimum runs of a curve (assumed)."""
 
 
 def describe_speed(
@@ -31,13 +31,18 @@ def describe_speed(
 ) -> dict[str, Any] | None:
     """Return risks along the impact speed with 95 % bands, and the speeds that halve them.
 
-    Cases of all scenarios that change the speed alone are taken together: given the speed they are
-    alike. Curves are means over bins of the speed, made to rise (isotonic regression); bands come
-    from resampled parts of the design.
+    Cases of all scenarios that change only the speed are pooled: given the speed they are
+    exchangeable. Curves are means over bins of the speed, made monotonic by isotonic regression;
+    bands come from resampled parts of the design.
 
     Parameters
     ----------
-    study : InjuryStudy. cases : with risks. shares : of the car fronts.
+    study : InjuryStudy
+        Checked study file.
+    cases : DataFrame
+        Runs with risks.
+    shares : mapping
+        Share of each car front.
 
     Returns
     -------
@@ -86,7 +91,7 @@ def describe_speed(
         speeds_half = np.array([_speed_at(middle, c, 0.5 * now) for c in resampled])
         half = _speed_at(middle, curve, 0.5 * now)
         held_half = speeds_half[np.isfinite(speeds_half)]
-        # Of no risk there is no half.
+        # A zero risk cannot be halved.
         known = now > 0.0 and np.isfinite(half) and held_half.size > 0.9 * RESAMPLES
         found["halved"][name] = {
             "now": now,
@@ -99,7 +104,7 @@ def describe_speed(
 
 
 def _wanted(study: InjuryStudy, held: pd.DataFrame) -> dict[str, Array]:
-    """Return what is followed along the speed: (n,) risks by name."""
+    """Return the risks (n,) by name that are averaged along the speed."""
     limit = study.limit
     risks = {
         f"AIS{level}+ head": held[f"risk_head_ais{level}"].to_numpy(dtype=float)
@@ -114,7 +119,7 @@ def _wanted(study: InjuryStudy, held: pd.DataFrame) -> dict[str, Array]:
 
 
 def _curve(sums: Array, weights: Array, parts: NDArray[np.int64]) -> Array:
-    """Return the rising curve of the chosen parts of the design."""
+    """Return the monotonic curve of the chosen parts of the design."""
     total = weights[parts].sum(axis=0)
     mean = sums[parts].sum(axis=0) / np.maximum(total, 1e-12)
     return np.asarray(optimize.isotonic_regression(mean, weights=np.maximum(total, 1e-12)).x)

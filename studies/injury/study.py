@@ -1,7 +1,8 @@
 """The injury study: from runs to AIS outcomes, for scenarios and car fronts.
 
-Every scenario meets every car front in a *cell*: the same draws of everything that the scenario
-does not change, so that differences between scenarios are sharp. Cells lie in folders of their own.
+Every scenario meets every car front in a *cell*: the same draws of all inputs that the scenario
+does not change, so that differences between scenarios have a small variance. Each cell has its own
+folder.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,14 +33,18 @@ from studies.runs import check_failure_rate, load_study_model
 
 @dataclass(frozen=True)
 class InjuryResults:
-    """What the analysis of an injury study takes.
+    """Input of the analysis of an injury study.
 
     Attributes
     ----------
     model : Model
-    functions : risk functions by name.
-    cases : complete runs of all cells, with risks and a drawn AIS.
-    ended : how the runs ended.
+        Model of the runs.
+    functions : dict
+        Risk functions by name.
+    cases : DataFrame
+        Complete runs of all cells, with risks and a drawn AIS.
+    ended : dict
+        Status of the runs.
     """
 
     model: Model
@@ -49,12 +54,20 @@ class InjuryResults:
 
 
 class Injury(StudyKind[InjuryStudy, list[PreparedCell], InjuryResults]):
-    """Scenarios and car fronts through one model, runs mapped to AIS outcomes."""
+    """Scenarios and car fronts through one model, with AIS outcomes of the runs."""
 
     schema = InjuryStudy
 
     def plan(self, study: InjuryStudy, folder: ResultsFolder) -> list[PreparedCell]:
-        """Return the cells, each with its model and the values of every input."""
+        """Return the cells, each with its model and the values of every input.
+
+        Parameters
+        ----------
+        study : InjuryStudy
+            Checked study file.
+        folder : ResultsFolder
+            Results folder of the study.
+        """
         return [_prepare(study, cell, folder) for cell in cells_of(study)]
 
     def execute(
@@ -66,11 +79,33 @@ class Injury(StudyKind[InjuryStudy, list[PreparedCell], InjuryResults]):
         workers: Workers,
         quiet: bool,
     ) -> None:
-        """Run what is missing of all cells."""
+        """Run the missing runs of all cells.
+
+        Parameters
+        ----------
+        study : InjuryStudy
+            Checked study file.
+        plan : list of PreparedCell
+            From ``plan``.
+        folder : ResultsFolder
+            Open for writing.
+        workers : int or str
+            Processes, -1 for one per core, or the address of a dask scheduler.
+        quiet : bool
+            No progress line.
+        """
         run_cells(study, folder, plan, workers=workers, quiet=quiet)
 
     def results(self, study: InjuryStudy, folder: ResultsFolder) -> InjuryResults:
-        """Return the cases of all cells, which are kept in the folder as well."""
+        """Return the cases of all cells and write them to the folder.
+
+        Parameters
+        ----------
+        study : InjuryStudy
+            Checked study file.
+        folder : ResultsFolder
+            Results folder of the study.
+        """
         model = load_study_model(study)
         functions = check_functions(study, model)
         frames = []
@@ -84,14 +119,32 @@ class Injury(StudyKind[InjuryStudy, list[PreparedCell], InjuryResults]):
         return InjuryResults(model, functions, cases, ended)
 
     def analyse(self, study: InjuryStudy, results: InjuryResults) -> dict[str, Any]:
-        """Return every number that the report prints."""
+        """Return every number that the report prints.
+
+        Parameters
+        ----------
+        study : InjuryStudy
+            Checked study file.
+        results : InjuryResults
+            From ``results``.
+        """
         found = analyse(study, results.model, results.cases, results.functions)
         return results.ended | found
 
     def subtitle(
         self, study: InjuryStudy, results: InjuryResults, analysis: Mapping[str, Any]
     ) -> str:
-        """Return the line below the report's title."""
+        """Return the line below the report's title.
+
+        Parameters
+        ----------
+        study : InjuryStudy
+            Checked study file.
+        results : InjuryResults
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        """
         return (
             f"Injury study of {analysis['runs']:,} runs of the {study.model.name} model, "
             f"{len(analysis['scenarios'])} scenario(s), {len(analysis['fronts'])} car front(s), "
@@ -101,7 +154,17 @@ class Injury(StudyKind[InjuryStudy, list[PreparedCell], InjuryResults]):
     def draw(
         self, study: InjuryStudy, results: InjuryResults, analysis: Mapping[str, Any]
     ) -> dict[str, Any]:
-        """Return the figures by file name."""
+        """Return the figures by file name.
+
+        Parameters
+        ----------
+        study : InjuryStudy
+            Checked study file.
+        results : InjuryResults
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        """
         return draw(study, results.cases, analysis, results.functions)
 
     def sections(
@@ -111,7 +174,19 @@ class Injury(StudyKind[InjuryStudy, list[PreparedCell], InjuryResults]):
         analysis: Mapping[str, Any],
         figures: Mapping[str, Any],
     ) -> Sequence[Section]:
-        """Return the sections of the report."""
+        """Return the sections of the report.
+
+        Parameters
+        ----------
+        study : InjuryStudy
+            Checked study file.
+        results : InjuryResults
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        figures : mapping
+            From ``draw``: figures by file name.
+        """
         return sections_of(study, analysis, figures, results.functions)
 
     def summarise(self, analysis: Mapping[str, Any]) -> list[str]:

@@ -24,9 +24,9 @@ from studies.runs import describe_ends
 Array = NDArray[np.float64]
 
 MIN_PAIRS = 20
-"""Runs with a value by both models below which they are not compared (assumed)."""
+"""Minimum runs with a value by both models for a comparison (assumed)."""
 MAX_APART = 5
-"""Runs that are listed where two models differ most."""
+"""Number of listed runs with the largest differences."""
 
 
 def analyse(
@@ -40,8 +40,16 @@ def analyse(
 
     Parameters
     ----------
-    study : ModelComparison. models, runs, nominal : by label.
-    outputs : that are compared.
+    study : ModelComparison
+        Checked study file.
+    models : mapping
+        Models by label.
+    runs : mapping
+        Table of runs by label; run k of each has the same inputs.
+    nominal : mapping
+        Outputs and poses of the nominal run by label.
+    outputs : list of str
+        Outputs that are compared.
 
     Raises
     ------
@@ -144,7 +152,7 @@ def published_methods(study: ModelComparison, model: Model) -> dict[str, Any]:
 def _pair(
     study: ModelComparison, values: Array, inputs: pd.DataFrame, parts: NDArray[np.int64]
 ) -> dict[str, Any]:
-    """Return how two models agree, over which inputs they do not, and where most."""
+    """Return agreement, sources of disagreement and largest differences of two models."""
     held = np.isfinite(values).all(axis=1)
     one = values[held, 0]
     two = without_rounding(one, values[held, 1])

@@ -1,4 +1,4 @@
-"""The report of a model comparison: what the method itself is worth, in words and pictures."""
+"""The report of a model comparison: model-form uncertainty, in text and figures."""
 
 from collections.abc import Mapping
 from itertools import combinations
@@ -27,7 +27,21 @@ def draw(
     nominal: Mapping[str, Mapping[str, Any]],
     analysis: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Return the figures by file name."""
+    """Return the figures by file name.
+
+    Parameters
+    ----------
+    study : ModelComparison
+        Checked study file.
+    models : mapping
+        Models by label.
+    runs : mapping
+        Table of runs by label.
+    nominal : mapping
+        Outputs and poses of the nominal run by label.
+    analysis : mapping
+        As in ``analysis.json``.
+    """
     names = analysis["compared"]
     unit_of = {name: analysis["outputs"][name]["unit"] for name in names}
     figures = failure_map(analysis)
@@ -69,15 +83,27 @@ def sections_of(
     analysis: Mapping[str, Any],
     figures: Mapping[str, Any],
 ) -> list[Section]:
-    """Return the sections of the report."""
+    """Return the sections of the report.
+
+    Parameters
+    ----------
+    study : ModelComparison
+        Checked study file.
+    models : mapping
+        Models by label.
+    analysis : mapping
+        As in ``analysis.json``.
+    figures : mapping
+        Figures by file name.
+    """
     sections = [
         Section(
-            "How much is the method",
+            "Model-form uncertainty",
             [_variance_said(name, analysis["outputs"][name]) for name in analysis["compared"]],
             [_variance_table(analysis)],
-            {"What the variance of each output is made of, the methods being equally likely: "
-             "what the inputs do alike in all of them, what the method shifts as a whole, and what "
-             "the methods make of the inputs differently.": figures["variance"]},
+            {"Variance split of each output over equally likely methods: effect of the inputs "
+             "common to all methods, shift between methods, and interaction of inputs and "
+             "methods.": figures["variance"]},
         )
     ]  # fmt: skip
     for one, two in combinations(study.models, 2):
@@ -93,17 +119,17 @@ def sections_of(
                 {"Above: every set of inputs by both models. Below: their difference against their "
                  "mean, with the mean difference and the limits between which 95 % of normal "
                  "differences lie; shaded, 95 % intervals of the lines. The widest 0.2 % at either "
-                 "end lie outside the pictures.": figures[f"pairs_{one}_{two}"]},
+                 "end lie outside the figures.": figures[f"pairs_{one}_{two}"]},
             )
         )  # fmt: skip
         sections.append(
             Section(
-                f"Where {one} and {two} disagree",
+                f"Sources of disagreement of {one} and {two}",
                 [_breaking_said(name, analysis["outputs"][name]["pairs"][pair])
                  for name in analysis["compared"]],
                 [_disagreement_table(analysis, pair), _apart_table(study, analysis, pair, models)],
-                {"By how much the rank correlation rises if the mean disagreement along an input "
-                 "is taken out. Grey: no more than for an input that has nothing to do with it.":
+                {"Gain in rank correlation if the mean disagreement along an input is removed. "
+                 "Grey: not above the gain of an unrelated input.":
                  figures[f"breaking_{one}_{two}"],
                  "Both models along the input over which each output disagrees most: median and "
                  "middle half of the runs.": figures[f"along_{one}_{two}"]},
@@ -118,11 +144,11 @@ def sections_of(
     sections.append(_published(study, models, analysis, pictures))
     sections.append(
         Section(
-            "How sure the numbers are",
+            "Sampling uncertainty",
             [
                 "Run k of every model has the same inputs. Intervals are 95 % t intervals between "
-                "independent parts of the design, of correlations on Fisher's scale. They count "
-                "the sampling only: models that agree may be wrong together.",
+                "independent parts of the design, of correlations on Fisher's scale. They cover "
+                "the sampling uncertainty only: models that agree may share an error.",
                 *failures_said(analysis),
             ],
             [status_table(analysis)],
@@ -136,7 +162,7 @@ def sections_of(
 
 
 def summarise(analysis: Mapping[str, Any]) -> list[Any]:
-    """Return what the command line prints: the variance split and each pair's agreement."""
+    """Return the command line's summary: the variance split and each pair's agreement."""
     pairs = next(iter(analysis["outputs"][name]["pairs"] for name in analysis["compared"]))
     return [
         *(_variance_said(name, analysis["outputs"][name]) for name in analysis["compared"]),
@@ -179,12 +205,13 @@ def _gain(value: float | None) -> str:
 def _variance_said(name: str, entry: Mapping[str, Any]) -> str:
     split = entry["variance"]
     if split["inputs"]["value"] is None:
-        return f"{_title(name)} does not vary, by whatever model."
+        return f"{_title(name)} does not vary in any model."
     return (
-        f"{_title(name)}: of its variance {_percent(split['inputs'])} is the inputs alike in all "
-        f"models, {_percent(split['method'])} the method's own shift, and "
-        f"{_percent(split['together'])} what the methods make of the inputs differently. For one "
-        f"set of inputs the methods scatter by {quantity(entry['method_sd'], entry['unit'])}."
+        f"{_title(name)}: of its variance {_percent(split['inputs'])} is due to the inputs alike "
+        f"in all models, {_percent(split['method'])} to the shift between methods, and "
+        f"{_percent(split['together'])} to the interaction of inputs and methods. For one set of "
+        "inputs the standard deviation of the methods is "
+        f"{quantity(entry['method_sd'], entry['unit'])}."
     )
 
 
@@ -198,8 +225,10 @@ def _variance_table(analysis: Mapping[str, Any]) -> Table:
              *(_percent(split[key]) for key in ("inputs", "method", "together")),
              number(entry["method_sd"]), f"{entry['rows']:,}"]
         )  # fmt: skip
-    head = ["output", "unit", "inputs", "method", "both together", "sd of the methods", "runs"]
-    return Table("Shares of the variance (95 %), and scatter of the methods.", head, rows)
+    head = ["output", "unit", "inputs", "method", "interaction", "sd of the methods", "runs"]
+    return Table(
+        "Shares of the variance (95 %), and standard deviation of the methods.", head, rows
+    )
 
 
 def _pair_said(name: str, found: Mapping[str, Any], one: str, two: str) -> str:
@@ -252,19 +281,19 @@ def _breaking_said(name: str, found: Mapping[str, Any]) -> str:
     gains, noise = found["breaking"]["gains"], found["breaking"]["noise"]
     rank = found["rank_correlation"]["value"]
     if rank is None:
-        return f"{_title(name)}: there is no rank correlation that an input could break."
+        return f"{_title(name)}: there is no rank correlation to analyse."
     if found["spread"]["value"] == 0.0:
-        return f"{_title(name)}: no input breaks the rank correlation of {rank:.2f}."
+        return f"{_title(name)}: no input reduces the rank correlation of {rank:.2f}."
     order = [key for key in sorted(gains, key=lambda k: -gains[k]) if gains[key] > noise]
     if not order:
         return (
-            f"{_title(name)}: no single input breaks the rank correlation of {rank:.2f}; what is "
-            "missing is scattered over all of them or lies in how they act together."
+            f"{_title(name)}: no single input reduces the rank correlation of {rank:.2f}; the "
+            "disagreement is spread over all inputs or due to their interactions."
         )
     named = ", ".join(f"{style.words(k)} (+{gains[k]:.2f})" for k in order[:NAMED])
     return (
-        f"{_title(name)}: the rank correlation of {rank:.2f} is broken most by {named}: so much "
-        "would it gain if both models answered to that input alike."
+        f"{_title(name)}: the rank correlation of {rank:.2f} is reduced most by {named}: the gain "
+        "if both models responded to that input alike."
     )
 
 
@@ -290,8 +319,8 @@ def _disagreement_table(analysis: Mapping[str, Any], pair: str) -> Table:
     for name in names:
         head += [f"{style.words(name)}: gain", f"{style.words(name)}: share of the difference"]
     return Table(
-        "What each input does to the rank correlation, and its first-order share of the variance "
-        "of the difference (95 %).",
+        "Gain in rank correlation by input, and first-order share of the variance of the "
+        "difference (95 %).",
         head,
         [*rows, last],
     )
@@ -318,7 +347,7 @@ def _apart_table(
             rows.append([style.words(name), str(entry["run"]), *values, *point])
     head = ["output", "run", *pair.split("/"),
             *(style.label(k, study.inputs[k].unit) for k in columns)]  # fmt: skip
-    return Table("Runs that are farthest apart, beyond the mean difference.", head, rows)
+    return Table("Runs with the largest differences beyond the mean difference.", head, rows)
 
 
 def _published(
@@ -334,16 +363,16 @@ def _published(
     for name, entry in analysis["published"].items():
         mine = analysis["outputs"].get(name, {}).get("method_sd")
         said = (
-            f"{_title(name)}: the {entry['methods']} published methods scatter by "
-            f"{quantity(entry['sd'], entry['unit'])}"
+            f"{_title(name)}: the {entry['methods']} published methods have a standard deviation "
+            f"of {quantity(entry['sd'], entry['unit'])}"
         )
         if entry["mean"]:
             said += f" ({number(100.0 * entry['sd'] / abs(entry['mean']), 2)} % of their mean)"
         said += " for one set of inputs"
         if mine is not None:
-            said += f"; ours, over all sets of inputs, by {quantity(mine, entry['unit'])}"
+            said += f"; ours, over all sets of inputs, have {quantity(mine, entry['unit'])}"
         lines.append(f"{said}.")
-    return Section("Beside the published methods", lines, tables, dict(pictures))
+    return Section("Comparison with the published methods", lines, tables, dict(pictures))
 
 
 def _models_said(analysis: Mapping[str, Any]) -> list[str]:
@@ -351,6 +380,6 @@ def _models_said(analysis: Mapping[str, Any]) -> list[str]:
     for label, entry in analysis["models"].items():
         line = f"{capital(label)}: model {entry['name']}, version {entry['version']}."
         for key, reason in entry["ignored"].items():
-            line += f" It makes nothing of {style.words(key)}: {reason}."
+            line += f" It ignores {style.words(key)}: {reason}."
         lines.append(line)
     return lines

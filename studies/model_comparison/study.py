@@ -1,6 +1,6 @@
-"""The model comparison: the same draws through every model, and what is the method's own.
+"""The model comparison: the same draws through every model give the model-form uncertainty.
 
-Each model runs in a cell of its own; run k of every cell has the same inputs.
+Each model runs in its own cell; run k of every cell has the same inputs.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,18 +28,21 @@ from studies.paired_runs import PreparedCell, cell_folder, cell_runs, run_cells
 from studies.runs import load_study_model
 
 NOMINAL = "nominal.json"
-"""Outputs and pictures' poses of the nominal run of a model, in its cell."""
+"""File of outputs and poses of the nominal run of a model, in its cell."""
 
 
 @dataclass(frozen=True)
 class ComparisonResults:
-    """What the analysis of a comparison takes, each by label of the model.
+    """Input of the analysis of a comparison, each by label of the model.
 
     Attributes
     ----------
-    models : the models.
-    runs : their tables; run k of each has the same inputs.
-    nominal : outputs and poses of their nominal runs.
+    models : dict
+        Models by label.
+    runs : dict
+        Table of runs by label; run k of each has the same inputs.
+    nominal : dict
+        Outputs and poses of the nominal run by label.
     """
 
     models: dict[str, Model]
@@ -53,7 +56,15 @@ class Comparison(StudyKind[ModelComparison, list[PreparedCell], ComparisonResult
     schema = ModelComparison
 
     def plan(self, study: ModelComparison, folder: ResultsFolder) -> list[PreparedCell]:
-        """Return the cells, each with its model and the values of every input."""
+        """Return the cells, each with its model and the values of every input.
+
+        Parameters
+        ----------
+        study : ModelComparison
+            Checked study file.
+        folder : ResultsFolder
+            Results folder of the study.
+        """
         cells = [_prepare(study, label, folder) for label in study.models]
         compared_outputs(study, {cell.name: cell.model for cell in cells})
         published_methods(study, cells[0].model)
@@ -68,14 +79,36 @@ class Comparison(StudyKind[ModelComparison, list[PreparedCell], ComparisonResult
         workers: Workers,
         quiet: bool,
     ) -> None:
-        """Run what is missing of all cells, and the nominal run of every model."""
+        """Run the missing runs of all cells, and the nominal run of every model.
+
+        Parameters
+        ----------
+        study : ModelComparison
+            Checked study file.
+        plan : list of PreparedCell
+            From ``plan``.
+        folder : ResultsFolder
+            Open for writing.
+        workers : int or str
+            Processes, -1 for one per core, or the address of a dask scheduler.
+        quiet : bool
+            No progress line.
+        """
         run_cells(study, folder, plan, workers=workers, quiet=quiet)
         for cell in plan:
             poses = _nominal(cell.model.run({}), study.report.strip_times)
             cell_folder(folder, cell.name).write_json(NOMINAL, poses)
 
     def results(self, study: ModelComparison, folder: ResultsFolder) -> ComparisonResults:
-        """Return models, runs and nominal runs."""
+        """Return models, runs and nominal runs.
+
+        Parameters
+        ----------
+        study : ModelComparison
+            Checked study file.
+        folder : ResultsFolder
+            Results folder of the study.
+        """
         models = {label: load_study_model(cell_study(study, label)) for label in study.models}
         return ComparisonResults(
             models,
@@ -87,14 +120,32 @@ class Comparison(StudyKind[ModelComparison, list[PreparedCell], ComparisonResult
         )
 
     def analyse(self, study: ModelComparison, results: ComparisonResults) -> dict[str, Any]:
-        """Return every number that the report prints."""
+        """Return every number that the report prints.
+
+        Parameters
+        ----------
+        study : ModelComparison
+            Checked study file.
+        results : ComparisonResults
+            From ``results``.
+        """
         outputs = compared_outputs(study, results.models)
         return analyse(study, results.models, results.runs, results.nominal, outputs)
 
     def subtitle(
         self, study: ModelComparison, results: ComparisonResults, analysis: Mapping[str, Any]
     ) -> str:
-        """Return the line below the report's title."""
+        """Return the line below the report's title.
+
+        Parameters
+        ----------
+        study : ModelComparison
+            Checked study file.
+        results : ComparisonResults
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        """
         named = ", ".join(f"{label} ({model.name})" for label, model in results.models.items())
         return (
             f"{study.design.n:,} sets of inputs through {len(results.models)} models: {named}, "
@@ -104,7 +155,17 @@ class Comparison(StudyKind[ModelComparison, list[PreparedCell], ComparisonResult
     def draw(
         self, study: ModelComparison, results: ComparisonResults, analysis: Mapping[str, Any]
     ) -> dict[str, Any]:
-        """Return the figures by file name."""
+        """Return the figures by file name.
+
+        Parameters
+        ----------
+        study : ModelComparison
+            Checked study file.
+        results : ComparisonResults
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        """
         return draw(study, results.models, results.runs, results.nominal, analysis)
 
     def sections(
@@ -114,11 +175,23 @@ class Comparison(StudyKind[ModelComparison, list[PreparedCell], ComparisonResult
         analysis: Mapping[str, Any],
         figures: Mapping[str, Any],
     ) -> Sequence[Section]:
-        """Return the sections of the report."""
+        """Return the sections of the report.
+
+        Parameters
+        ----------
+        study : ModelComparison
+            Checked study file.
+        results : ComparisonResults
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        figures : mapping
+            From ``draw``: figures by file name.
+        """
         return sections_of(study, results.models, analysis, figures)
 
     def summarise(self, analysis: Mapping[str, Any]) -> list[str]:
-        """Return how far the models agree."""
+        """Return the agreement of the models."""
         return summarise(analysis)
 
 
@@ -177,7 +250,7 @@ def _prepare(study: ModelComparison, label: str, folder: ResultsFolder) -> Prepa
 
 
 def _nominal(run: Run, times: list[float]) -> dict[str, Any]:
-    """Return what a report says and draws of a nominal run."""
+    """Return the outputs and poses of a nominal run for the report."""
     found: dict[str, Any] = {"status": run.status, "outputs": dict(run.outputs)}
     if run.scene is not None:
         scene = run.scene

@@ -1,4 +1,4 @@
-"""The report of a Monte Carlo study: what its numbers say, in words, tables and pictures."""
+"""The report of a Monte Carlo study: text, tables and figures."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -22,12 +22,26 @@ def sections_of(
     analysis: Mapping[str, Any],
     figures: Mapping[str, Any],
 ) -> list[Section]:
-    """Return the sections of the report."""
+    """Return the sections of the report.
+
+    Parameters
+    ----------
+    study : MonteCarloStudy
+        Checked study file.
+    model : Model
+        Model of the runs.
+    runs : DataFrame
+        Table of the runs.
+    analysis : mapping
+        As in ``analysis.json``.
+    figures : mapping
+        Figures by file name.
+    """
     captions = {
         "distributions": "Above: runs by output; shaded the central 90 %, the median with its 95 % "
         "interval. Below: cumulative share with a 95 % band for the whole curve. The widest "
-        "0.2 % of the runs at either end lie outside the picture above.",
-        "throw_and_wad": "Throw and wrap-around distance of every run, and the accident's own.",
+        "0.2 % of the runs at either end lie outside the figure above.",
+        "throw_and_wad": "Throw and wrap-around distance of every run and of the accident.",
         "impact_speed": "Outputs against impact speed: median and 90 % band of the runs around it.",
         "rank_correlation": "Spearman rank correlation of inputs and outputs; grey: not "
         "distinguishable from zero; hatched: none, as an input or output does not vary.",
@@ -43,8 +57,9 @@ def sections_of(
                 pick("distributions")),
         Section("The accident", _accident(analysis, model), (), pick("throw_and_wad")),
         Section("Rank correlations", (
-            "Rank correlations say which inputs an output follows, one at a time; they are no "
-            "share of variance.",), (), pick("impact_speed", "rank_correlation")),
+            "Rank correlations measure the monotonic association of an output with one input at "
+            "a time; they are not shares of variance.",),
+            (), pick("impact_speed", "rank_correlation")),
         Section("Inputs", (), [_input_table(study, model, runs)]),
         Section("Sampling uncertainty", [_honesty(study), *failures_said(analysis)],
                 [status_table(analysis)], pick("convergence", "failures")),
@@ -87,7 +102,7 @@ def _summary(study: MonteCarloStudy, model: Model, analysis: Mapping[str, Any]) 
 
 
 def _distribution(name: str, entry: Mapping[str, Any]) -> str:
-    """Say in words how an output is distributed."""
+    """Return a sentence on the distribution of an output."""
     title, count = _title(name), entry["n"]
     if "quantiles" not in entry:
         return f"{title}: {'only one run' if count else 'no run'} has a value."
@@ -161,13 +176,13 @@ def _honesty(study: MonteCarloStudy) -> str:
     if study.design.method == "monte-carlo":
         return (
             "Samples are independent: quantiles have order-statistic intervals, probabilities "
-            "Wilson intervals, means t intervals, all at 95 %. They count the sampling error only, "
-            "not what the model itself gets wrong."
+            "Wilson intervals, means t intervals, all at 95 %. They cover the sampling "
+            "uncertainty only, not model error."
         )
     return (
         f"The design is {study.design.n // study.design.size} independent replicates of "
         f"{study.design.size} samples; every interval is a 95 % t interval from the spread between "
-        "the replicates. It counts the sampling error only, not what the model itself gets wrong."
+        "the replicates. It covers the sampling uncertainty only, not model error."
     )
 
 

@@ -18,7 +18,7 @@ class MonteCarloStudy(SampledStudy):
         return self.report.outputs
 
     def design_topics(self) -> dict[str, Any]:
-        """Return what of the design changes the numbers of a run, by topic."""
+        """Return the parts of the design that affect the values of a run, by topic."""
         return {
             "design.method": self.design.method,
             "design.replicate_size": self.design.size,

@@ -29,7 +29,15 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns]):
     schema = MonteCarloStudy
 
     def plan(self, study: MonteCarloStudy, folder: ResultsFolder) -> RunPlan:
-        """Return the model and the sampled values of its inputs."""
+        """Return the model and the sampled values of its inputs.
+
+        Parameters
+        ----------
+        study : MonteCarloStudy
+            Checked study file.
+        folder : ResultsFolder
+            Results folder of the study.
+        """
         model = load_study_model(study)
         report_outputs(study, model)
         marks_of(study, model)
@@ -46,7 +54,21 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns]):
         workers: Workers,
         quiet: bool,
     ) -> None:
-        """Run what is missing and keep the histories of the first runs."""
+        """Run the missing runs and keep the histories of the first runs.
+
+        Parameters
+        ----------
+        study : MonteCarloStudy
+            Checked study file.
+        plan : RunPlan
+            From ``plan``.
+        folder : ResultsFolder
+            Open for writing.
+        workers : int or str
+            Processes, -1 for one per core, or the address of a dask scheduler.
+        quiet : bool
+            No progress line.
+        """
         design = study.design
         runs = run_rows(
             study, plan.model, plan.columns, folder,
@@ -56,19 +78,45 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns]):
         _keep_histories(study, plan.model, runs, folder)
 
     def results(self, study: MonteCarloStudy, folder: ResultsFolder) -> ModelRuns:
-        """Return the model and the runs of the design."""
+        """Return the model and the runs of the design.
+
+        Parameters
+        ----------
+        study : MonteCarloStudy
+            Checked study file.
+        folder : ResultsFolder
+            Results folder of the study.
+        """
         model = load_study_model(study)
         runs = folder.runs(columns_of(model))
         return ModelRuns(model, runs[runs["run"] < study.design.n])
 
     def analyse(self, study: MonteCarloStudy, results: ModelRuns) -> dict[str, Any]:
-        """Return every number that the report prints."""
+        """Return every number that the report prints.
+
+        Parameters
+        ----------
+        study : MonteCarloStudy
+            Checked study file.
+        results : ModelRuns
+            From ``results``.
+        """
         return analyse(study, results.model, results.runs)
 
     def subtitle(
         self, study: MonteCarloStudy, results: ModelRuns, analysis: Mapping[str, Any]
     ) -> str:
-        """Return the line below the report's title."""
+        """Return the line below the report's title.
+
+        Parameters
+        ----------
+        study : MonteCarloStudy
+            Checked study file.
+        results : ModelRuns
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        """
         return (
             f"Monte Carlo study of {len(results.runs):,} runs of the {results.model.name} model, "
             f"{study.design.method} design, seed {study.seed}"
@@ -77,7 +125,17 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns]):
     def draw(
         self, study: MonteCarloStudy, results: ModelRuns, analysis: Mapping[str, Any]
     ) -> dict[str, Any]:
-        """Return the figures by file name."""
+        """Return the figures by file name.
+
+        Parameters
+        ----------
+        study : MonteCarloStudy
+            Checked study file.
+        results : ModelRuns
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        """
         return draw(study, results.model, results.runs, analysis)
 
     def sections(
@@ -87,7 +145,19 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns]):
         analysis: Mapping[str, Any],
         figures: Mapping[str, Any],
     ) -> Sequence[Section]:
-        """Return the sections of the report."""
+        """Return the sections of the report.
+
+        Parameters
+        ----------
+        study : MonteCarloStudy
+            Checked study file.
+        results : ModelRuns
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        figures : mapping
+            From ``draw``: figures by file name.
+        """
         return sections_of(study, results.model, results.runs, analysis, figures)
 
     def summarise(self, analysis: Mapping[str, Any]) -> list[Table]:
@@ -95,7 +165,15 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns]):
         return summarise(analysis)
 
     def independent_rows(self, runs: pd.DataFrame, folder: ResultsFolder) -> pd.DataFrame:
-        """Return all runs: each is a draw of its own."""
+        """Return all runs: each is an independent draw.
+
+        Parameters
+        ----------
+        runs : DataFrame
+            One row a run.
+        folder : ResultsFolder
+            Results folder of the study.
+        """
         return runs
 
 
@@ -123,7 +201,17 @@ def marks_of(study: MonteCarloStudy, model: Model) -> dict[str, list[distributio
 
 
 def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[str, Any]:
-    """Return every number that the report prints."""
+    """Return every number that the report prints.
+
+    Parameters
+    ----------
+    study : MonteCarloStudy
+        Checked study file.
+    model : Model
+        Model of the runs.
+    runs : DataFrame
+        Table of the runs.
+    """
     ended, held = describe_runs(study, model, runs)
     complete = runs[held]
     groups = None if study.design.method == "monte-carlo" else complete["replicate"].to_numpy()
@@ -159,7 +247,7 @@ def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[st
             else:
                 analysis["exceedance"].setdefault(name, []).append(entry)
     columns = complete[[*sampled, *wanted]].astype(float)
-    # Ranks of a column that differs by rounding alone say nothing.
+    # Ranks of a column that differs by rounding alone are meaningless.
     varying = columns.apply(lambda column: statistics.varies(column.to_numpy()))
     ranks = columns.where(varying, axis="columns").corr("spearman")
     table = ranks.loc[sampled, wanted]
@@ -174,10 +262,22 @@ def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[st
 def draw(
     study: MonteCarloStudy, model: Model, runs: pd.DataFrame, analysis: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return the study's figures by file name."""
+    """Return the study's figures by file name.
+
+    Parameters
+    ----------
+    study : MonteCarloStudy
+        Checked study file.
+    model : Model
+        Model of the runs.
+    runs : DataFrame
+        Table of the runs.
+    analysis : mapping
+        As in ``analysis.json``.
+    """
     complete = runs[runs["status"].isin(complete_status(model))]
     unit_of = {item.name: item.unit for item in model.outputs}
-    # An output without a value in any run has nothing to draw.
+    # An output without a value in any run is not drawn.
     wanted = {name: unit_of[name] for name in analysis["convergence"]}
     marks = marks_of(study, model)
     figures = failure_map(analysis)

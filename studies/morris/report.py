@@ -1,4 +1,4 @@
-"""The report of a Morris study: which factors matter, in words, tables and pictures."""
+"""The report of a Morris study: factor screening in text, tables and figures."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -16,8 +16,8 @@ from studies.morris.schema import MorrisStudy
 NAMED = 4
 """Factors that a sentence names, the largest."""
 CURVED = 0.5
-"""Scatter of the elementary effects, as a share of their mean size, above which a factor counts as
-acting through curvature or interactions (assumed)."""
+"""Ratio sigma / mu_star of the elementary effects above which a factor counts as non-linear or
+interacting (assumed)."""
 
 
 def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
@@ -35,7 +35,19 @@ def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
 def sections_of(
     study: MorrisStudy, model: Model, analysis: Mapping[str, Any], figures: Mapping[str, Any]
 ) -> list[Section]:
-    """Return the sections of the report."""
+    """Return the sections of the report.
+
+    Parameters
+    ----------
+    study : MorrisStudy
+        Checked study file.
+    model : Model
+        Model of the runs.
+    analysis : mapping
+        As in ``analysis.json``.
+    figures : mapping
+        Figures by file name.
+    """
     outputs = analysis["outputs"]
 
     def one(name: str, caption: str) -> dict[str, Any]:
@@ -44,16 +56,16 @@ def sections_of(
     reach = f"from the {100 * TAIL:g} % to the {100 - 100 * TAIL:g} % point of a factor"
     return [
         Section(
-            "Which factors matter",
+            "Factor screening",
             [*summarise(analysis), *_not_ranked(analysis)],
             [_table(name, outputs[name]) for name in analysis["ranked"] if _varies(outputs[name])],
             one("mean_effects",
-                f"Mean size of the elementary effects (μ*), {reach}, with 95 % intervals. Factors "
-                "that do not pass the noise line are not distinguishable from none.")
+                f"Mean absolute elementary effect (μ*), {reach}, with 95 % intervals. Factors "
+                "below the noise line are not distinguishable from zero.")
             | one("elementary_effects",
-                  "Scatter of the elementary effects (σ) over their mean size: at the bottom "
-                  "factors that act alike everywhere, towards the upper left those whose effect "
-                  "depends on the other factors or on where they stand. Groups have no σ."),
+                  "Standard deviation of the elementary effects (σ) over μ*: factors at the bottom "
+                  "act linearly, those towards the upper left through curvature or interactions. "
+                  "Groups have no σ."),
         ),
         Section(
             "Sampling uncertainty",
@@ -62,8 +74,8 @@ def sections_of(
                 f"other by one large step between {study.design.levels} levels. The dummy perturbs "
                 f"every input by {PERTURBATION:g} of its range: its effect is the model's noise "
                 f"floor. Intervals are 95 %, by {study.report.resamples:,} bootstrap resamples of "
-                "trajectories. A Morris study ranks factors; shares of variance take a Sobol' "
-                "study of those that matter.",
+                "trajectories. A Morris study ranks factors; shares of variance need a Sobol' "
+                "study of the influential ones.",
                 *failures_said(analysis, "trajectories"),
             ],
             [status_table(analysis)],
@@ -75,12 +87,12 @@ def sections_of(
 
 
 def summarise(analysis: Mapping[str, Any]) -> list[str]:
-    """Return what matters for the reported outputs, a paragraph each."""
+    """Return the influential factors of the reported outputs, a paragraph each."""
     return [sentence(name, analysis["outputs"][name]) for name in analysis["ranked"]]
 
 
 def sentence(name: str, entry: Mapping[str, Any]) -> str:
-    """Say in words which factors move an output."""
+    """Return a sentence on the influential factors of an output."""
     factors = dict(entry["factors"])
     noise = factors.pop(DUMMY)
     order = sorted(factors, key=lambda f: -factors[f]["value"])
@@ -90,13 +102,13 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     if not _varies(entry):
         return f"{capital(title)} does not vary."
     if not clear:
-        return f"{capital(title)}: no factor stands out of the noise."
+        return f"{capital(title)}: no factor is distinguishable from noise."
     named = ", ".join(
         f"{style.words(f)} ({number(factors[f]['value'])} ± "
         f"{number(factors[f]['value'] - factors[f]['low'], 2)}{suffix})"
         for f in clear[:NAMED]
     )
-    lines = [f"{capital(title)} is moved most by {named}."]
+    lines = [f"{capital(title)} is most sensitive to {named}."]
     curved = [
         f for f in clear[:NAMED] if (factors[f]["sigma"] or 0.0) > CURVED * factors[f]["value"]
     ]
@@ -113,7 +125,7 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
 
 
 def _varies(entry: Mapping[str, Any]) -> bool:
-    """Tell whether any factor, or the dummy, moves an output at all."""
+    """Return whether any factor, or the dummy, changes an output."""
     return any(row["value"] != 0.0 for row in entry["factors"].values())
 
 
@@ -127,7 +139,7 @@ def _not_ranked(analysis: Mapping[str, Any]) -> list[str]:
         return []
     return [
         "Not ranked, because too few trajectories have a value in every row (no failed run, and a "
-        f"contact that the output is about): {', '.join(missing)}."
+        f"contact that the output describes): {', '.join(missing)}."
     ]
 
 

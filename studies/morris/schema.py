@@ -22,7 +22,7 @@ class MorrisDesign(StudyTable):
 
 
 class MorrisStudy(FactorStudy):
-    """``kind = "morris"``: which of many factors matter at all."""
+    """``kind = "morris"``: screening of many factors."""
 
     kind: Literal["morris"]
     design: MorrisDesign = MorrisDesign()
@@ -34,6 +34,6 @@ class MorrisStudy(FactorStudy):
         return self.report.outputs
 
     def design_topics(self) -> dict[str, Any]:
-        """Return what of the design changes the numbers of a run, by topic."""
+        """Return the parts of the design that affect the values of a run, by topic."""
         levels = {"design.levels": self.design.levels, "design.grid": "shifted"}
         return super().design_topics() | levels

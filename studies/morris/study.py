@@ -1,4 +1,4 @@
-"""The Morris study: which of many factors matter at all, for a few dozen runs each."""
+"""The Morris study: screening of many factors with a few dozen runs each."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -37,7 +37,15 @@ class Morris(StudyKind[MorrisStudy, RunPlan, ModelRuns]):
     schema = MorrisStudy
 
     def plan(self, study: MorrisStudy, folder: ResultsFolder) -> RunPlan:
-        """Return the model and the values of its inputs along all trajectories."""
+        """Return the model and the values of its inputs along all trajectories.
+
+        Parameters
+        ----------
+        study : MorrisStudy
+            Checked study file.
+        folder : ResultsFolder
+            Results folder of the study.
+        """
         model = load_study_model(study)
         report_outputs(study, model)
         check_independent(study)
@@ -58,7 +66,21 @@ class Morris(StudyKind[MorrisStudy, RunPlan, ModelRuns]):
         workers: Workers,
         quiet: bool,
     ) -> None:
-        """Run what is missing of the trajectories."""
+        """Run the missing runs of the trajectories.
+
+        Parameters
+        ----------
+        study : MorrisStudy
+            Checked study file.
+        plan : RunPlan
+            From ``plan``.
+        folder : ResultsFolder
+            Open for writing.
+        workers : int or str
+            Processes, -1 for one per core, or the address of a dask scheduler.
+        quiet : bool
+            No progress line.
+        """
         block = len(factors_of(list(study.inputs), study.groups)) + 1
         run_rows(
             study, plan.model, plan.columns, folder,
@@ -68,16 +90,42 @@ class Morris(StudyKind[MorrisStudy, RunPlan, ModelRuns]):
         )  # fmt: skip
 
     def results(self, study: MorrisStudy, folder: ResultsFolder) -> ModelRuns:
-        """Return the model and the runs of the trajectories that are whole."""
+        """Return the model and the runs of the trajectories that are whole.
+
+        Parameters
+        ----------
+        study : MorrisStudy
+            Checked study file.
+        folder : ResultsFolder
+            Results folder of the study.
+        """
         model = load_study_model(study)
         return ModelRuns(model, complete_blocks(folder, model))
 
     def analyse(self, study: MorrisStudy, results: ModelRuns) -> dict[str, Any]:
-        """Return every number that the report prints."""
+        """Return every number that the report prints.
+
+        Parameters
+        ----------
+        study : MorrisStudy
+            Checked study file.
+        results : ModelRuns
+            From ``results``.
+        """
         return analyse(study, results.model, results.runs)
 
     def subtitle(self, study: MorrisStudy, results: ModelRuns, analysis: Mapping[str, Any]) -> str:
-        """Return the line below the report's title."""
+        """Return the line below the report's title.
+
+        Parameters
+        ----------
+        study : MorrisStudy
+            Checked study file.
+        results : ModelRuns
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        """
         return (
             f"Morris screening by {len(results.runs):,} runs of the {results.model.name} model: "
             f"{analysis['trajectories']:,} trajectories, seed {study.seed}"
@@ -86,7 +134,17 @@ class Morris(StudyKind[MorrisStudy, RunPlan, ModelRuns]):
     def draw(
         self, study: MorrisStudy, results: ModelRuns, analysis: Mapping[str, Any]
     ) -> dict[str, Any]:
-        """Return the figures by file name."""
+        """Return the figures by file name.
+
+        Parameters
+        ----------
+        study : MorrisStudy
+            Checked study file.
+        results : ModelRuns
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        """
         return draw(analysis)
 
     def sections(
@@ -96,15 +154,35 @@ class Morris(StudyKind[MorrisStudy, RunPlan, ModelRuns]):
         analysis: Mapping[str, Any],
         figures: Mapping[str, Any],
     ) -> Sequence[Section]:
-        """Return the sections of the report."""
+        """Return the sections of the report.
+
+        Parameters
+        ----------
+        study : MorrisStudy
+            Checked study file.
+        results : ModelRuns
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        figures : mapping
+            From ``draw``: figures by file name.
+        """
         return sections_of(study, results.model, analysis, figures)
 
     def summarise(self, analysis: Mapping[str, Any]) -> list[str]:
-        """Return what matters for the reported outputs."""
+        """Return the influential factors of the reported outputs."""
         return summarise(analysis)
 
     def independent_rows(self, runs: pd.DataFrame, folder: ResultsFolder) -> pd.DataFrame:
-        """Refuse: trajectories are no sample of the inputs."""
+        """Refuse: trajectories are no sample of the inputs.
+
+        Parameters
+        ----------
+        runs : DataFrame
+            One row a run.
+        folder : ResultsFolder
+            Results folder of the study.
+        """
         raise UserError(
             f"{folder.path}: trajectories of a Morris study are no sample of its inputs; its own "
             "report ranks them"
@@ -113,6 +191,15 @@ class Morris(StudyKind[MorrisStudy, RunPlan, ModelRuns]):
 
 def analyse(study: MorrisStudy, model: Model, runs: pd.DataFrame) -> dict[str, Any]:
     """Return every number that the report prints.
+
+    Parameters
+    ----------
+    study : MorrisStudy
+        Checked study file.
+    model : Model
+        Model of the runs.
+    runs : DataFrame
+        Runs of the whole trajectories.
 
     Raises
     ------

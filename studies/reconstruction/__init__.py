@@ -1,1 +1,1 @@
-"""The reconstruction: one run, printed beside published tables and drawn."""
+"""The reconstruction: one run, compared with published tables and drawn."""

@@ -1,4 +1,4 @@
-"""The reconstruction: one run, printed beside published tables and drawn."""
+"""The reconstruction: one run, compared with published tables and drawn."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -127,7 +127,21 @@ def draw(study: Reconstruction, run: Run) -> dict[str, Any]:
 def write_reconstruction(
     study: Reconstruction, text: str, run: Run, tables: list[PublishedTable], folder: ResultsFolder
 ) -> None:
-    """Write the results folder of a reconstruction: outputs, histories, figures, GIF, report."""
+    """Write the results folder of a reconstruction: outputs, histories, figures, GIF, report.
+
+    Parameters
+    ----------
+    study : Reconstruction
+        Checked study file.
+    text : str
+        The study file as written.
+    run : Run
+        With histories and scene.
+    tables : list of PublishedTable
+        Comparison with published tables.
+    folder : ResultsFolder
+        Results folder of the study.
+    """
     model = load_study_model(study)
     with folder.open_for_writing():
         folder.write_text("study.toml", text)
@@ -184,7 +198,7 @@ def _report(
     if work:
         numbers.append(
             Table(
-                "Work on the body by kind; the energy residual is what they leave unexplained.",
+                "Energy balance: work on the body by kind, and the energy residual.",
                 ["kind", "work [J]"],
                 [[name.replace("_", " "), f"{value:,.1f}"] for name, value in work.items()],
             )
@@ -192,7 +206,7 @@ def _report(
     strip = {captions[name]: figures[name] for name in ("kinematics",) if name in figures}
     rest = {captions[name]: figure for name, figure in figures.items() if name != "kinematics"}
     sections = [
-        Section("Beside the published tables", (), [as_table(table) for table in tables]),
+        Section("Comparison with the published tables", (), [as_table(table) for table in tables]),
         Section("Kinematics", (), (), strip, animations),
         Section("Histories", (), (), rest),
         Section("Numbers", (), numbers),
@@ -205,7 +219,7 @@ def _report(
 
 
 def _work(run: Run) -> dict[str, dict[str, float]]:
-    """Return the work by kind (J), if the model books it."""
+    """Return the work by kind (J), if the model reports an energy balance."""
     if "work" not in run.histories:
         return {}
     return {"work": {k: float(v[0]) for k, v in run.histories["work"].channels.items()}}

@@ -34,11 +34,16 @@ def fit_risk_curves(
 
     Parameters
     ----------
-    source : CSV or Parquet table of cases, or the folder of an injury study.
-    stimulus : column.
-    folder : where the report goes.
-    level : AIS from which a case counts as injured, where the table has a column ``ais``.
-    scenario : of an injury study; by default the study as it stands.
+    source : path
+        CSV or Parquet table of cases, or the folder of an injury study.
+    stimulus : str
+        Column that the risk depends on.
+    folder : ResultsFolder
+        Folder of the report.
+    level : int
+        AIS from which a case counts as injured, where the table has a column ``ais``.
+    scenario : str, optional
+        Of an injury study; by default the reference scenario.
 
     Returns
     -------
@@ -74,21 +79,21 @@ def fit_risk_curves(
 
 def _sections_of(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list[Section]:
     caption = (
-        "Risk with its 95 % band, the cases, the estimate without a family, and the stimuli at 5, "
+        "Risk with its 95 % band, the cases, the non-parametric estimate, and the stimuli at 5, "
         "25 and 50 % risk."
     )
     shown = {caption: figures["risk_curve"]}
     return [
         Section("Risk curve", summarise(analysis), tables(analysis), shown),
-        Section("How the curve was fitted", _method(analysis)),
+        Section("Method", _method(analysis)),
     ]
 
 
 def _read(source: Path, stimulus: str, scenario: str | None) -> tuple[pd.DataFrame, str | None]:
-    """Return the table of cases, and the unit of the stimulus where a study tells it.
+    """Return the table of cases, and the unit of the stimulus where a study states it.
 
-    Of a study's cases one scenario is taken, its car fronts in proportion to their shares: others
-    are the same people once more.
+    One scenario of a study is used, its car fronts in proportion to their shares: other scenarios
+    repeat the same people.
     """
     if not source.is_dir():
         if scenario is not None:
@@ -111,16 +116,16 @@ def _read(source: Path, stimulus: str, scenario: str | None) -> tuple[pd.DataFra
         return table, None
     named = known[stimulus]
     if stimulus in study.inputs:
-        # People read an input in the unit that the study file gives it in.
+        # Inputs are shown in the unit of the study file.
         shown = study.inputs[stimulus].unit
         table[stimulus] /= units.factor(shown, named)
         named = shown
-    # A blow that did not happen is no case.
+    # A run without the impact is not a case.
     return table[table[stimulus].notna()], named
 
 
 def summarise(analysis: Mapping[str, Any]) -> list[str]:
-    """Return the result in words."""
+    """Return the result in sentences."""
     unit_text = f" {unit(analysis['unit'])}".rstrip() if analysis["unit"] else ""
     half, quarter, few = (
         f"{interval(analysis['at'][p])}{unit_text}" for p in ("0.5", "0.25", "0.05")
@@ -140,7 +145,7 @@ def summarise(analysis: Mapping[str, Any]) -> list[str]:
             else f"moves it by {number(abs(worst['shift']), 2)} standard errors"
         )
         lines.append(
-            f"{influence['influential']} case(s) carry the curve: leaving out case "
+            f"{influence['influential']} influential case(s): leaving out case "
             f"{worst['case']} {moved}."
         )
     return lines
@@ -173,16 +178,16 @@ def tables(analysis: Mapping[str, Any]) -> list[Table]:
 
 
 def _weighting(analysis: Mapping[str, Any]) -> list[str]:
-    """Return what the weights of the cases mean, if they have any."""
+    """Return a sentence on the weights of the cases, if they have any."""
     if analysis["weight"] is None:
         return []
     total = number(analysis["weight"], 6)
     if analysis["counted"]:
-        return [f"The rows stand for {total} cases by their column 'weight', all counted."]
+        return [f"The rows represent {total} cases by their column 'weight', all counted."]
     return [
-        f"The rows are weighted by their column 'weight' (sum {total}). The weights are no whole "
-        "numbers and count as shares of a population: the intervals come from the scatter of the "
-        "rows (sandwich), and the AIC, of the weighted likelihood, only compares the families."
+        f"The rows are weighted by their column 'weight' (sum {total}). The weights are not whole "
+        "numbers and count as shares of a population: intervals use the sandwich estimator, and "
+        "the AIC of the weighted likelihood only compares the families."
     ]
 
 
@@ -191,9 +196,8 @@ def _method(analysis: Mapping[str, Any]) -> list[str]:
     lines = [
         "Survival analysis as in ISO/TS 18506: injured cases are left-censored, uninjured ones "
         f"right-censored{f', {exact} exact' if exact else ''}; Weibull, log-normal and "
-        "log-logistic curves by greatest likelihood, the one with the smallest AIC is drawn. With "
-        "few cases the AIC hardly tells the families apart: see how far their medians lie from "
-        "each other.",
+        "log-logistic curves by maximum likelihood, the one with the smallest AIC is drawn. With "
+        "few cases the AIC hardly distinguishes the families: compare their medians.",
         *_weighting(analysis),
         "The band is normal on the scale of the linear predictor. The quality index is the width "
         "of the 95 % interval of the stimulus over the stimulus: up to 0.5 good, 1 fair, 1.5 "
@@ -201,7 +205,7 @@ def _method(analysis: Mapping[str, Any]) -> list[str]:
     ]
     if analysis["influence"] is not None:
         lines.append(
-            "Each case was left out once; one counts as carrying the curve if the stimulus at 5, "
+            "Each case was left out once; one counts as influential if the stimulus at 5, "
             f"25 or 50 % risk moves by more than {INFLUENTIAL:g} standard error."
         )
     return lines

@@ -1,1 +1,1 @@
-"""Sensitivity from the runs of any results folder."""
+"""Given-data sensitivity from the runs of a results folder."""

@@ -1,4 +1,4 @@
-"""Sensitivity from the runs of any results folder, whatever the study's design was."""
+"""Given-data sensitivity from the runs of a results folder."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -29,14 +29,18 @@ def measure_sensitivity(
     outputs: Sequence[str] = (),
     quiet: bool = False,
 ) -> dict[str, Any]:
-    """Measure what drives the outputs of a results folder and write a report of it.
+    """Estimate sensitivities of outputs from the runs of a results folder and write a report.
 
     Parameters
     ----------
-    source : folder of a Monte Carlo or Sobol' study.
-    out : where the report goes, by default ``sensitivity`` in the folder.
-    outputs : names, by default those that the study reports.
-    quiet : no progress line.
+    source : ResultsFolder
+        Of a Monte Carlo or Sobol' study.
+    out : ResultsFolder, optional
+        Folder of the report, by default ``sensitivity`` in the folder.
+    outputs : sequence of str
+        Names of outputs, by default those that the study reports.
+    quiet : bool
+        No progress line.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The report of given-data sensitivity: what goes with an output, by three measures."""
+"""The report of given-data sensitivity by three measures."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -41,22 +41,22 @@ def sections_of(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list
             sections.append(Section(heading, said))
             continue
         shown = {
-            f"What goes with {words}: 95 % intervals for the first-order index, bootstrap scatter "
+            f"Sensitivity of {words}: 95 % intervals for the first-order index, bootstrap scatter "
             "for delta, smallest and largest slice for PAWN. Grey: not above the noise line.":
             figures[f"measures_{name}"],
             f"Conditional mean and band of {words}.": figures[f"main_effects_{name}"],
         }  # fmt: skip
         sections.append(Section(heading, said, [_table(name, entry)], shown))
-    return [*sections, Section("How to read the numbers", _explained(analysis))]
+    return [*sections, Section("Interpretation and limitations", _explained(analysis))]
 
 
 def summarise(analysis: Mapping[str, Any]) -> list[str]:
-    """Return what goes with the outputs, a paragraph each."""
+    """Return the influential inputs of the outputs, a paragraph each."""
     return [sentence(name, entry) for name, entry in analysis["outputs"].items()]
 
 
 def sentence(name: str, entry: Mapping[str, Any]) -> str:
-    """Say in words which inputs go with an output."""
+    """Return sentences on the influential inputs of an output."""
     words = style.words(name)
     if not _varies(entry):
         return f"{capital(words)} does not vary."
@@ -69,9 +69,9 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
             f"{max(1.0, 50.0 * (first[key]['high'] - first[key]['low'])):.0f} %"
             for key in clear[:NAMED]
         )
-        text = f"Some of the variance of {words} goes with single inputs: {named}."
+        text = f"First-order shares of the variance of {words}: {named}."
     else:
-        text = f"No single input stands out in the mean of {words}."
+        text = f"No input has a clear first-order effect on {words}."
     others = [
         key
         for key in order
@@ -80,8 +80,8 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     ]
     if others:
         text += (
-            f" Its distribution moves with {', '.join(map(style.words, others))} as well, though "
-            "no share of the variance is clear."
+            f" Its distribution also depends on {', '.join(map(style.words, others))}, though "
+            "without a clear share of the variance."
         )
     none = [
         key
@@ -89,7 +89,7 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
         if not any(table["inputs"][key]["clear"] for table in entry["measures"].values())
     ]
     if none:
-        text += f" Not distinguishable from none: {', '.join(map(style.words, none))}."
+        text += f" Not distinguishable from zero: {', '.join(map(style.words, none))}."
     return text
 
 
@@ -112,20 +112,20 @@ def _table(name: str, entry: Mapping[str, Any]) -> Table:
 
 def _explained(analysis: Mapping[str, Any]) -> list[str]:
     lines = [
-        "First-order index, rank based: the share of the variance that goes with the input alone. "
+        "First-order index, rank based: the share of the variance due to the input alone. "
         "Delta: the share of the whole density that moves when the input is known. PAWN: the "
-        "distance that the cumulative distribution moves. The last two also see effects on the "
-        "spread or shape that leave the mean alone, and they are never negative: their noise line "
+        "distance that the cumulative distribution moves. The last two also measure effects on "
+        "spread or shape without an effect on the mean, and are never negative: their noise line "
         "is above zero.",
-        f"The noise line is the largest value of {DUMMIES} dummies that have nothing to do with "
-        "the output: one unrelated input in twenty passes it by chance.",
-        "None of them sees an input that acts through interactions alone; total indices take a "
-        "Sobol' study.",
+        f"The noise line is the largest value of {DUMMIES} unrelated dummy inputs: one "
+        "unrelated input in twenty passes it by chance.",
+        "None of them detects an input that acts through interactions alone; total indices need "
+        "a Sobol' study.",
     ]
     if analysis["dependent"]:
         lines.append(
-            f"{', '.join(map(style.words, analysis['dependent']))} depend on each other: what one "
-            "of them does shows with the others as well. The numbers are associations, and they "
-            "do not add up."
+            f"{', '.join(map(style.words, analysis['dependent']))} depend on each other: the "
+            "effect of one also appears with the others. The numbers are associations and do not "
+            "add up."
         )
     return lines

@@ -30,13 +30,26 @@ STEP_RESAMPLES = 200
 
 @dataclass(frozen=True)
 class _Ranked:
-    """Outputs with their indices, and the blocks that these come from.
+    """Outputs with their indices, and the blocks of runs that give these.
 
     Attributes
     ----------
-    begun : what the analysis begins with. complete : (n,) runs that did not fail.
-    cube : (base points, block, outputs). kept : (base points, outputs). scramble : of each point.
-    factors : names. outputs : entries by name. wanted : reported outputs that have an index.
+    begun : dict
+        First entries of the analysis.
+    complete : (n,) bool array
+        Runs that did not fail.
+    cube : (base points, block, outputs) array
+        Outputs of the runs by base point.
+    kept : (base points, outputs) bool array
+        Whether a base point has a value in every row.
+    scramble : (base points,) int array
+        Scramble of each base point.
+    factors : tuple of str
+        Names of the factors.
+    outputs : dict
+        Indices by output.
+    wanted : list of str
+        Reported outputs that have an index.
     """
 
     begun: dict[str, Any]
@@ -58,12 +71,21 @@ class _Ranked:
             for factor, entry in self.outputs[name]["total"].items()
             if factor != DUMMY
         ]
-        # An interval that could not be estimated is not a narrow one.
+        # An interval that could not be estimated counts as infinitely wide.
         return float(np.max(np.nan_to_num(widths, nan=np.inf), initial=0.0))
 
 
 def widest_interval(study: SobolStudy, model: Model, runs: pd.DataFrame) -> float:
     """Return the widest interval of a total index of the reported outputs.
+
+    Parameters
+    ----------
+    study : SobolStudy
+        Checked study file.
+    model : Model
+        Model of the runs.
+    runs : DataFrame
+        Runs of the whole base points.
 
     Raises
     ------
@@ -75,6 +97,15 @@ def widest_interval(study: SobolStudy, model: Model, runs: pd.DataFrame) -> floa
 
 def analyse(study: SobolStudy, model: Model, runs: pd.DataFrame) -> dict[str, Any]:
     """Return every number that the report prints.
+
+    Parameters
+    ----------
+    study : SobolStudy
+        Checked study file.
+    model : Model
+        Model of the runs.
+    runs : DataFrame
+        Runs of the whole base points.
 
     Raises
     ------
@@ -144,7 +175,7 @@ def _indices(
 
 
 def _entry(found: Indices, k: int, factors: Sequence[str]) -> dict[str, Any]:
-    """Return what is found for output ``k``, by factor."""
+    """Return the indices of output ``k`` by factor."""
     entry: dict[str, Any] = {
         "variance": float(found.variance[k]),
         "noise_sd": float(np.sqrt(found.total[0, -1, k] * found.variance[k])),

@@ -1,4 +1,4 @@
-"""The report of a Sobol' study: what its indices say, in words, tables and pictures."""
+"""The report of a Sobol' study: indices in text, tables and figures."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -48,7 +48,19 @@ def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
 def sections_of(
     study: SobolStudy, model: Model, analysis: Mapping[str, Any], figures: Mapping[str, Any]
 ) -> list[Section]:
-    """Return the sections of the report."""
+    """Return the sections of the report.
+
+    Parameters
+    ----------
+    study : SobolStudy
+        Checked study file.
+    model : Model
+        Model of the runs.
+    analysis : mapping
+        As in ``analysis.json``.
+    figures : mapping
+        Figures by file name.
+    """
     wanted = list(analysis["convergence"])
     outputs = analysis["outputs"]
 
@@ -64,15 +76,15 @@ def sections_of(
 
     sections = [
         Section(
-            "What drives the outputs",
+            "Sensitivity indices",
             summarise(analysis),
             [_index_table(name, outputs[name]) for name in wanted if varies(outputs[name])],
             one("indices", "First-order and total indices with 95 % intervals. Factors whose total "
-                "index does not pass the noise line are not distinguishable from none."),
+                "index is below the noise line are not distinguishable from zero."),
         ),
         Section(
             "All outputs",
-            ["Total indices: the share of an output's variance that would be left if all but this "
+            ["Total indices: the share of an output's variance that would remain if all but this "
              "factor were known.", *_constant(analysis), *_not_given(analysis)],
             (),
             one("heatmap", "Total index of every output by factor. Hatched: none, as the output "
@@ -83,8 +95,8 @@ def sections_of(
         sections.append(
             Section(
                 "Main effects",
-                ("What an output does on average as one input goes through its distribution, and "
-                 "the spread that the others leave.",),
+                ("Conditional mean of an output along one input, and the remaining spread due to "
+                 "the others.",),
                 (),
                 picked("main_effects", "Conditional mean and band of"),
             )
@@ -92,16 +104,17 @@ def sections_of(
     second = picked("second_order", "Second-order indices of")
     if second:
         sections.append(
-            Section("Interactions of two", ("Grey: not distinguishable from zero.",), (), second)
+            Section(
+                "Second-order interactions", ("Grey: not distinguishable from zero.",), (), second
+            )
         )
     return [
         *sections,
         Section(
             "The model's noise floor",
 (
-                f"The dummy perturbs every input by {PERTURBATION:g} of its range. An output that "
-                "follows its inputs does not feel that; what it does to a chaotic one, no input "
-                "explains, however well it is known.",
+                f"The dummy perturbs every input by {PERTURBATION:g} of its range. A smooth output "
+                "does not change; the scatter of a chaotic one cannot be attributed to any input.",
             ),
             [_noise_table(analysis)],
         ),
@@ -123,12 +136,12 @@ def sections_of(
 
 
 def summarise(analysis: Mapping[str, Any]) -> list[str]:
-    """Return what drives the reported outputs, a paragraph each."""
+    """Return the influential factors of the reported outputs, a paragraph each."""
     return [sentence(name, analysis["outputs"][name]) for name in analysis["convergence"]]
 
 
 def sentence(name: str, entry: Mapping[str, Any]) -> str:
-    """Say in words what drives an output."""
+    """Return sentences on the influential factors of an output."""
     title = style.words(name)
     if not varies(entry):
         return f"{capital(title)} does not vary."
@@ -136,7 +149,7 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     if any(row["low"] is None for table in (first, total) for row in table.values()):
         return (
             f"{capital(title)} hardly ever changes: in some resamples of the design it does not "
-            "vary, so its indices have no intervals and nothing is said of what drives it."
+            "vary, so its indices have no intervals and are not interpreted."
         )
     noise = total[DUMMY]
     factors = [factor for factor in total if factor != DUMMY]
@@ -150,8 +163,8 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
             + (f", {named}." if named else ".")
         )
     else:
-        lines.append(f"no factor on its own explains a share of the variance of {title} that is "
-                     "clear of zero.")  # fmt: skip
+        lines.append(f"no first-order index of {title} is distinguishable "
+                     "from zero.")  # fmt: skip
     alone = entry["alone"]
     lines.append(
         f"All factors on their own explain {_share(alone)}; "
@@ -161,7 +174,7 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
             else "interactions are not distinguishable from none."
         )
     )
-    # What chaos does shows in every total index.
+    # Chaotic scatter raises every total index.
     felt = [f for f in factors if total[f]["low"] > noise["high"]]
     mixed = [f for f in felt if total[f]["low"] > first[f]["high"] + noise["high"]]
     mixed.sort(key=lambda f: first[f]["value"] - total[f]["value"])
@@ -174,7 +187,7 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     quiet = [f for f in felt if f not in clear and f not in mixed[:NAMED]]
     if quiet:
         lines.append(
-            "Clear of zero only with their interactions: "
+            "Distinguishable from zero only through interactions: "
             f"{', '.join(style.words(f) for f in quiet)}."
         )
     weak = [f for f in factors if f not in felt and f not in clear]
@@ -184,7 +197,7 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
             f"{', '.join(style.words(f) for f in weak)}."
         )
     lines.append(
-        f"{_share(noise)} of the variance belongs to no input: a perturbation of all "
+        f"{_share(noise)} of the variance is not attributable to any input: a perturbation of all "
         f"inputs by {PERTURBATION:g} of their range makes {title} scatter by "
         f"{_quantity(entry['noise_sd'], entry)} (standard deviation)."
     )
@@ -199,7 +212,7 @@ def _share(entry: Mapping[str, float]) -> str:
 
 
 def _percent(entry: Mapping[str, float], unit: str = " %") -> str:
-    # Below zero estimates are noise about it.
+    # Negative estimates are noise about zero.
     return f"{max(0, round(100.0 * entry['value']))}{unit}"
 
 
@@ -208,7 +221,7 @@ def _quantity(value: float | None, entry: Mapping[str, Any]) -> str:
 
 
 def varies(entry: Mapping[str, Any]) -> bool:
-    """Tell whether an output with indices varies; a variance beyond all numbers is none in JSON."""
+    """Return whether an output with indices varies; an infinite variance is null in JSON."""
     return bool(entry["variance"] != 0.0)
 
 
@@ -246,7 +259,7 @@ def _not_given(analysis: Mapping[str, Any]) -> list[str]:
         return []
     return [
         "No index is given where too few base points have a value in every row (no failed run, "
-        f"and a contact that the output is about): {', '.join(missing)}."
+        f"and a contact that the output describes): {', '.join(missing)}."
     ]
 
 
@@ -263,8 +276,8 @@ def _noise_table(analysis: Mapping[str, Any]) -> Table:
                     "–" if noise is None else f"{100.0 * noise:.2g} %",
                 ]
             )
-    head = ["output", "standard deviation", "of it the noise floor", "share of the variance"]
-    return Table("What no input explains, by output.", head, rows)
+    head = ["output", "standard deviation", "noise floor", "share of the variance"]
+    return Table("Noise floor by output.", head, rows)
 
 
 def _convergence_said(analysis: Mapping[str, Any]) -> str:
@@ -288,6 +301,6 @@ def _intervals_said(study: SobolStudy) -> str:
     return (
         f"The design is {SCRAMBLES} independent scrambles of a Sobol' sequence. Intervals are 95 % "
         f"t intervals with the standard deviation of {study.report.resamples:,} bootstrap "
-        "resamples of whole scrambles. They count the sampling error only, not what the model "
-        "itself gets wrong."
+        "resamples of whole scrambles. They cover the sampling uncertainty only, not "
+        "model error."
     )

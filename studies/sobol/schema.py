@@ -8,7 +8,7 @@ from mcstudy.studyfile.schema import FactorReport, FactorStudy, StudyTable
 
 
 class SaltelliDesign(StudyTable):
-    """``[design]`` of a Sobol' study: base points, doubled until the indices are known."""
+    """``[design]`` of a Sobol' study: base points, doubled up to the tolerance of the indices."""
 
     n: Annotated[int, Field(ge=64, le=2**20)] = 1024
     start: Annotated[int, Field(ge=64, le=2**20)] = 128
@@ -37,5 +37,5 @@ class SobolStudy(FactorStudy):
         return self.report.outputs
 
     def design_topics(self) -> dict[str, Any]:
-        """Return what of the design changes the numbers of a run, by topic."""
+        """Return the parts of the design that affect the values of a run, by topic."""
         return super().design_topics() | {"design.second_order": self.design.second_order}

@@ -23,7 +23,7 @@ from studies.sobol.schema import SobolStudy
 
 
 class Sobol(StudyKind[SobolStudy, RunPlan, ModelRuns]):
-    """Saltelli's design of one model, doubled until the indices are known well enough.
+    """Saltelli's design of one model, doubled until the indices are accurate enough.
 
     It doubles from ``design.start`` base points until the widest interval of a total index of the
     reported outputs is below ``design.tolerance``, or ``design.n`` is reached; without a tolerance
@@ -33,7 +33,15 @@ class Sobol(StudyKind[SobolStudy, RunPlan, ModelRuns]):
     schema = SobolStudy
 
     def plan(self, study: SobolStudy, folder: ResultsFolder) -> RunPlan:
-        """Return the model and the values of its inputs over the whole design."""
+        """Return the model and the values of its inputs over the whole design.
+
+        Parameters
+        ----------
+        study : SobolStudy
+            Checked study file.
+        folder : ResultsFolder
+            Results folder of the study.
+        """
         model = load_study_model(study)
         report_outputs(study, model)
         check_independent(study)
@@ -54,7 +62,21 @@ class Sobol(StudyKind[SobolStudy, RunPlan, ModelRuns]):
         workers: Workers,
         quiet: bool,
     ) -> None:
-        """Run the design, doubling it as far as needed."""
+        """Run the design, doubling it as far as needed.
+
+        Parameters
+        ----------
+        study : SobolStudy
+            Checked study file.
+        plan : RunPlan
+            From ``plan``.
+        folder : ResultsFolder
+            Open for writing.
+        workers : int or str
+            Processes, -1 for one per core, or the address of a dask scheduler.
+        quiet : bool
+            No progress line.
+        """
         design = study.design
         factors = factors_of(list(study.inputs), study.groups)
         block = block_size(factors, second_order=design.second_order)
@@ -77,16 +99,42 @@ class Sobol(StudyKind[SobolStudy, RunPlan, ModelRuns]):
             n *= 2
 
     def results(self, study: SobolStudy, folder: ResultsFolder) -> ModelRuns:
-        """Return the model and the runs of the base points that are whole."""
+        """Return the model and the runs of the base points that are whole.
+
+        Parameters
+        ----------
+        study : SobolStudy
+            Checked study file.
+        folder : ResultsFolder
+            Results folder of the study.
+        """
         model = load_study_model(study)
         return ModelRuns(model, complete_blocks(folder, model))
 
     def analyse(self, study: SobolStudy, results: ModelRuns) -> dict[str, Any]:
-        """Return every number that the report prints."""
+        """Return every number that the report prints.
+
+        Parameters
+        ----------
+        study : SobolStudy
+            Checked study file.
+        results : ModelRuns
+            From ``results``.
+        """
         return analyse(study, results.model, results.runs)
 
     def subtitle(self, study: SobolStudy, results: ModelRuns, analysis: Mapping[str, Any]) -> str:
-        """Return the line below the report's title."""
+        """Return the line below the report's title.
+
+        Parameters
+        ----------
+        study : SobolStudy
+            Checked study file.
+        results : ModelRuns
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        """
         return (
             f"Sobol' study of {len(results.runs):,} runs of the {results.model.name} model: "
             f"{analysis['base_points']:,} base points, seed {study.seed}"
@@ -95,7 +143,17 @@ class Sobol(StudyKind[SobolStudy, RunPlan, ModelRuns]):
     def draw(
         self, study: SobolStudy, results: ModelRuns, analysis: Mapping[str, Any]
     ) -> dict[str, Any]:
-        """Return the figures by file name."""
+        """Return the figures by file name.
+
+        Parameters
+        ----------
+        study : SobolStudy
+            Checked study file.
+        results : ModelRuns
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        """
         return draw(analysis)
 
     def sections(
@@ -105,13 +163,33 @@ class Sobol(StudyKind[SobolStudy, RunPlan, ModelRuns]):
         analysis: Mapping[str, Any],
         figures: Mapping[str, Any],
     ) -> Sequence[Section]:
-        """Return the sections of the report."""
+        """Return the sections of the report.
+
+        Parameters
+        ----------
+        study : SobolStudy
+            Checked study file.
+        results : ModelRuns
+            From ``results``.
+        analysis : mapping
+            From ``analyse``, as read from ``analysis.json``.
+        figures : mapping
+            From ``draw``: figures by file name.
+        """
         return sections_of(study, results.model, analysis, figures)
 
     def summarise(self, analysis: Mapping[str, Any]) -> list[str]:
-        """Return what drives the reported outputs."""
+        """Return the influential factors of the reported outputs."""
         return summarise(analysis)
 
     def independent_rows(self, runs: pd.DataFrame, folder: ResultsFolder) -> pd.DataFrame:
-        """Return the rows of Saltelli's matrices A and B."""
+        """Return the rows of Saltelli's matrices A and B.
+
+        Parameters
+        ----------
+        runs : DataFrame
+            One row a run.
+        folder : ResultsFolder
+            Results folder of the study.
+        """
         return runs[is_base_row(runs["run"].to_numpy(), folder.design()["block"])]

@@ -23,7 +23,7 @@ from studies.validation.check import Part, check, references
 Array = NDArray[np.float64]
 
 FACTORS = (1.0, 1.5, 2.2, 3.0)
-"""Neck stiffness beside the nominal one."""
+"""Neck stiffness factors besides the nominal one."""
 DONOR = (49.0, 1.776, 69.9, 4.5)
 """Age, stature (m), mass (kg) of the five donors of Kang 2018 on average [found]; head (kg)
 [recalled]."""

@@ -21,12 +21,24 @@ class Check:
 
     Attributes
     ----------
-    key, what, unit : what is compared.
-    low, high : bounds of the reference; NaN where it is open.
-    source, label : where the bounds come from: found, recalled, estimated, assumed or exact.
-    ours : our number, NaN if it could not be had.
-    reason : why it lies outside, if it does and that is known.
-    exact : whether it is a closed form or a conservation law, which has no excuse.
+    key : str
+        Key of the reference.
+    what : str
+        Compared quantity.
+    unit : str
+        Its unit.
+    low, high : float
+        Bounds of the reference; NaN where it is open.
+    source : str
+        Source of the bounds.
+    label : str
+        found, recalled, estimated, assumed, measured or exact.
+    ours : float
+        Our number, NaN if not available.
+    reason : str
+        Why it lies outside, if it does and that is known.
+    exact : bool
+        Whether it is a closed form or a conservation law, which must hold.
     """
 
     key: str
@@ -51,7 +63,7 @@ class Check:
 
     @property
     def reference(self) -> str:
-        """The bounds in words."""
+        """The bounds as text."""
         low, high = f"{self.low:,.6g}", f"{self.high:,.6g}"
         if math.isnan(self.low):
             return f"at most {high}"
@@ -67,7 +79,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Part:
-    """A part of the validation: heading, what it says, checks and figures by caption."""
+    """A part of the validation: heading, paragraphs, checks and figures by caption."""
 
     heading: str
     paragraphs: Sequence[str]

@@ -1,4 +1,4 @@
-"""The head's impact on the road, beside measured ones of falling child dummies.
+"""The head's impact on the road, compared with those of falling child dummies.
 
 A robot ran into standing dummies, which fell and struck the ground with their heads (D.
 Paez-Granados and A. Billard, 2022; digitised, not part of the project). Equal set-ups differ
@@ -82,7 +82,7 @@ def validate(workers: int, measured: Path) -> Part:
         "three-year-old, pushed by a car front at the robot's speeds, have a median of "
         f"{number(float(np.median(ours)))}, nine in ten {number(low)} to {number(high)}. The "
         "pushes differ (a robot's bumper, a car), and a falling person's arms protect; neither was "
-        "made to fit. After a crash at 40 km/h the case's child meets the road with a median of "
+        "calibrated. After a crash at 40 km/h the case's child meets the road with a median of "
         f"{number(float(np.median(struck)))}."
     )
     panel = Panel(

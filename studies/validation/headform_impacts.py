@@ -1,4 +1,4 @@
-"""Headform impacts against computed ones and closed forms, and a corridor's way to HIC."""
+"""Headform impacts against computed ones and closed forms, and HIC from corridors."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 SPEEDS = np.linspace(4.0, 14.0, 11)
 """m/s, of the exponents and the figure."""
 FAR = 1.0
-"""m, where the curves of the table end; none of its impacts gets that far."""
+"""m, end of the curves of the table, beyond the penetration of all its impacts."""
 
 
 def validate(workers: int) -> Part:
@@ -74,8 +74,8 @@ def validate(workers: int) -> Part:
     }
     for name, corridor in hoods.items():
         figures[
-            f"Corridor in, corridor out: {name}. Left the stiffness corridor, right the HIC15 that "
-            "comes of it in the case's test (30 km/h) and in the regulation's (child 2.5 kg, "
+            f"Corridors of {name}: stiffness (left) and the resulting HIC15 (right) "
+            "in the case's test (30 km/h) and in the regulation's (child 2.5 kg, "
             "40 km/h; 3.5 kg, 35 km/h)."
         ] = draw_corridor(
             {k: (getattr(corridor, k).penetration, getattr(corridor, k).force)

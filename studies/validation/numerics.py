@@ -66,7 +66,7 @@ def validate(workers: int) -> Part:
         f"{number(float(np.median(energy)), 2)} % (median) and {number(float(energy.max()), 2)} % "
         "at worst of the largest work of one kind; with a quarter of the step at worst "
         f"{number(float(left.max()), 2)} %, "
-        "so what is missing is resolution of the hardest blows on the road, not physics."
+        "so the residual is due to the time resolution of the hardest impacts on the road."
     )
     speed = 3.6 * coarse.loc[ended, "impact_speed"].to_numpy()
     panels = [
@@ -107,7 +107,7 @@ def _cases() -> list[dict[str, float]]:
     cases = [dict(zip(names, row.tolist(), strict=True)) for row in rows]
     bounds = {item.name: (item.low, item.high) for item in inputs}
     for case, share in zip(cases, unit, strict=True):
-        # Before the car, or there is no crash; a build and a head that a body can have.
+        # In front of the car, or there is no crash; a possible build and head.
         place = dict(zip(names, share.tolist(), strict=True))
         case["lateral_offset"] = _between((-WIDEST, WIDEST), place["lateral_offset"])
         index = _between(BUILD, place["body_mass"])
@@ -122,7 +122,7 @@ def _between(bounds: tuple[float, float], share: float) -> float:
 
 
 def _change(coarse: pd.DataFrame, fine: pd.DataFrame, name: str, rows: pd.Series) -> Array:
-    """Return the changes (%) of an output with the step, where it has a value to speak of."""
+    """Return the changes (%) of an output with the step, where its value is not negligible."""
     old, new = coarse.loc[rows, name].to_numpy(), fine.loc[rows, name].to_numpy()
-    # Below HIC 10 the head hardly met anything: a per cent of it says nothing.
+    # Below HIC 10 the contact is negligible and a relative change meaningless.
     return np.asarray(100.0 * np.abs(old - new) / np.maximum(new, 10.0))

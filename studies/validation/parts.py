@@ -46,8 +46,14 @@ def run_parts(
 
     Parameters
     ----------
-    names : of ``part_names()``. measured : folder of real measurements, may be missing.
-    workers : processes, -1 for one a core. quiet : show no progress.
+    names : tuple of str
+        Of ``part_names()``.
+    measured : path
+        Folder of real measurements, may be missing.
+    workers : int
+        Processes, -1 for one per core.
+    quiet : bool
+        No progress line.
     """
     # Compile once, before several workers would each do it.
     load_model("multibody").run({})

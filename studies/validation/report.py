@@ -28,9 +28,15 @@ def validate(
     Parameters
     ----------
     folder : ResultsFolder
-    measured : folder of real measurements; the part that needs them is left out without it.
-    only : names of parts, all by default.
-    workers : processes, -1 for one a core. quiet : show no progress.
+        Results folder.
+    measured : path
+        Folder of real measurements; checks that need it are skipped without it.
+    only : sequence of str
+        Names of parts, all by default.
+    workers : int
+        Processes, -1 for one per core.
+    quiet : bool
+        No progress line.
 
     Returns
     -------
@@ -63,7 +69,7 @@ def validate(
 def check_exact(analysis: dict[str, Any]) -> None:
     """Raise ``StudyError`` if a closed form or a conservation law is missed or has no number.
 
-    References of other kinds stay in the table as misses: the model is what it is.
+    References of other kinds stay in the table as misses.
     """
     missed = [c["what"] for c in analysis["checks"] if c["exact"] and c["verdict"] != INSIDE]
     if missed:
@@ -119,17 +125,18 @@ def _report(parts: Sequence[Part]) -> str:
         f"outside, {counts[NOT_RUN]} were not run."
     )
     labels = (
-        "Labels: found was read in its source; recalled and estimated were not, and judge "
-        "accordingly; assumed is our own choice; measured stands on data at hand; exact is a "
-        "closed form, a conservation law or a requirement of the numerics. Tuned to references of "
-        "this table were the curves of chest, abdomen and hip (the hub tests and the donors'), and "
-        "the nominal case to the five numbers of the paper that the README names; nothing else."
+        "Labels: found was read in its source; recalled and estimated were not, and are "
+        "weaker; assumed is our own choice; measured is based on data at hand; exact is a "
+        "closed form, a conservation law or a requirement of the numerics. Calibrated to "
+        "references of this table were the curves of chest, abdomen and hip (the hub tests and "
+        "the donors'), and the nominal case to the five numbers of the paper that the README "
+        "names; nothing else."
     )
     sections = [
         Section(
             "Summary",
             (summary, labels),
-            [Table("What lies outside, and why.", ["what", "ours", "reference", "why"],
+            [Table("Checks outside their reference.", ["what", "ours", "reference", "why"],
                    [[c.what, quantity(c.ours, c.unit), c.cited,
                      c.reason or "unexplained"] for c in missed])],
         )
@@ -143,7 +150,7 @@ def _report(parts: Sequence[Part]) -> str:
         )
         for part in parts
     ]
-    return render("Validation", "The models against what is known", sections)
+    return render("Validation", "Comparison of the models with references", sections)
 
 
 def _row(c: Check) -> list[str]:

@@ -7,7 +7,7 @@ at a speed v under an angle, flies, lands and slides with friction mu to rest, s
 
 so that v lies between ``sqrt(2 mu g (s - mu H) / (1 + mu^2))`` and ``sqrt(2 mu g (s - mu H))`` for
 any upward angle: bodies that leave falling are outside its bounds, not outside its relation. It
-says nothing about the way on the car, nor that v is the car's speed.
+does not cover the motion on the car, nor does it equate v with the car's speed.
 """
 
 import math
@@ -38,7 +38,7 @@ NO_SEPARATION = "no_separation"
 
 
 def separations(cases: Sequence[Mapping[str, float]], *, workers: int = -1) -> pd.DataFrame:
-    """Return how runs leave the car and what follows.
+    """Return the separation of runs from the car and the way to rest.
 
     Columns: ``along``, ``up`` (m/s) of the centre of gravity, ``fall`` and ``way`` (m) from there
     to rest, ``friction``. Runs that never leave the car, or land before they do, are left out.
@@ -48,7 +48,7 @@ def separations(cases: Sequence[Mapping[str, float]], *, workers: int = -1) -> p
     cases : sequence of mapping
         Inputs that differ from nominal.
     workers : int
-        Processes, -1 for one a core.
+        Processes, -1 for one per core.
     """
     model = load_model("multibody")
     names = [item.name for item in model.inputs]
@@ -114,7 +114,7 @@ def searle(distance: Array, friction: Array | float) -> tuple[Array, Array]:
 
 
 def _searle_of(table: pd.DataFrame) -> tuple[Array, Array]:
-    """Return Searle's bounds (m/s) for the ways of runs, each less what its fall is worth."""
+    """Return Searle's bounds (m/s) for the ways of runs, each less the effect of its fall."""
     mu = table["friction"].to_numpy()
     reach = table["way"].to_numpy() - mu * table["fall"].to_numpy()
     return searle(np.maximum(reach, 0.0), mu)

@@ -28,9 +28,9 @@ def sweep(
     model : str
         Name of the model.
     options : mapping, optional
-        Of the model.
+        Options of the model.
     workers : int
-        Processes, -1 for one a core.
+        Processes, -1 for one per core.
     """
     loaded = load_model(model, options)
     names = [item.name for item in loaded.inputs]

@@ -122,7 +122,7 @@ def _worst(medians: Array, relation: Callable[[Array], Array]) -> float:
 
 
 def _words(name: str, table: pd.DataFrame, left: pd.DataFrame) -> str:
-    """Say where the runs lie against the published relations."""
+    """Return sentences on the runs compared with the published relations."""
     errors = toor_wrap(_medians(table)) - SPEEDS
     side = "lower" if errors.mean() < 0.0 else "higher"
     rising = int((left["up"] >= 0.0).sum())

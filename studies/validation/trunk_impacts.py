@@ -1,4 +1,4 @@
-"""Hub impacts on thorax, abdomen and pelvis of adults, beside the measured ones.
+"""Hub impacts on thorax, abdomen and pelvis of adults, compared with measured ones.
 
 Lateral and oblique impacts of 14 donors by a pendulum of 23.4 kg (D. Viano, SAE 892432, 1989;
 digitised data that are not part of the project) are simulated one by one: the body has the age,

@@ -8,7 +8,7 @@ from scipy import stats
 from mcstudy.diagnosis.fit import Fit, fit, start_scores
 from mcstudy.diagnosis.layout import Layout, Scatter, lay_out
 from mcstudy.diagnosis.marginal import Marginal, log_bayes_factor, quadratic_form
-from mcstudy.diagnosis.naming import rank_causes, settle
+from mcstudy.diagnosis.model_selection import rank_causes, settle
 from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.diagnosis.search import fit_base, search
@@ -73,8 +73,7 @@ def test_evidence_is_the_density_of_the_data_with_all_scores_integrated_out(fitt
 
 
 def test_scores_and_information_of_shapes_are_those_of_the_whole_covariance(fitted: Fit) -> None:
-    problem = make_problem(3)
-    layouts = layouts_of(problem)
+    layouts = layouts_of(make_problem(3))
     rng = np.random.default_rng(0)
     shapes = [rng.standard_normal((r.size, 3)) for r in fitted.residuals]
     marginal = Marginal(fitted, layouts, shapes)
@@ -90,8 +89,7 @@ def test_scores_and_information_of_shapes_are_those_of_the_whole_covariance(fitt
 
 
 def test_another_repeatability_is_another_covariance(fitted: Fit) -> None:
-    problem = make_problem(3)
-    layouts = layouts_of(problem)
+    layouts = layouts_of(make_problem(3))
     other = Scatter(0.03, 0.001)
     shapes = [np.ones((r.size, 1)) for r in fitted.residuals]
     marginal = Marginal(fitted, layouts, shapes)
@@ -102,7 +100,6 @@ def test_another_repeatability_is_another_covariance(fitted: Fit) -> None:
     for layout in layouts:
         part = slice(left, left + layout.scattering.size)
         ratio = layout.scatter_sizes(other) / layout.scatter_sizes(SCATTER)
-        scale[part] = np.where(layout.scattering, 1.0, 1.0)
         scale[part][layout.scattering] = ratio
         left += layout.scattering.size
     inverse = np.linalg.inv(np.eye(whole.size) + (table * scale) @ (table * scale).T)
@@ -111,8 +108,7 @@ def test_another_repeatability_is_another_covariance(fitted: Fit) -> None:
 
 
 def test_drawn_data_have_the_mean_squares_of_the_model(fitted: Fit) -> None:
-    problem = make_problem(3)
-    layouts = layouts_of(problem)
+    layouts = layouts_of(make_problem(3))
     rng = np.random.default_rng(1)
     shapes = [rng.standard_normal((r.size, 2)) for r in fitted.residuals]
     marginal = Marginal(fitted, layouts, shapes)
@@ -150,6 +146,7 @@ def test_no_cause_no_alarm_and_a_cause_is_named() -> None:
     assert (found.cause, found.ambiguous, found.second) == ("bump", (), None)
 
 
+@pytest.mark.slow
 def test_p_values_of_data_that_the_model_makes_are_uniform() -> None:
     p = np.array([search(make_problem(100 + k), []).screening.p_value for k in range(16)])
     assert stats.kstest(p, "uniform").pvalue > 0.01

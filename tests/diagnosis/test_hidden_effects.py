@@ -1,8 +1,6 @@
-"""Effects hidden by another program must be found: the fast tier.
+"""Effects hidden by another program must be found; the full tier: ``validate --diagnosis``."""
 
-The full tier is ``mcstudy validate --diagnosis``.
-"""
-
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +9,7 @@ import pytest
 
 from mcstudy.measurement.measured_data import load_measured
 from models.registry import load_model
+from studies.diagnosis.causes import causes_of
 from studies.validation.diagnosis.drawing import CATALOGUE, KINDS, OUTSIDE, draw
 from studies.validation.diagnosis.hidden_effects import CURVE, Hidden, Laboratory, make_tests
 from studies.validation.diagnosis.tier import TARGETS, analyse, plan
@@ -70,55 +69,64 @@ def test_what_is_hidden_depends_on_the_seed_alone() -> None:
     assert all(len(draw(k, "pair")) == 2 for k in range(5))
 
 
-def trial(tmp: Path, hidden: list[Hidden], seed: int, monkeypatch: pytest.MonkeyPatch) -> Outcome:
+def trial(hidden: list[Hidden], seed: int, monkeypatch: pytest.MonkeyPatch) -> Outcome:
     monkeypatch.setattr("studies.validation.diagnosis.trial.draw", lambda _seed, _kind: hidden)
     return run_trial(Trial(seed, "catalogue", force=False))
 
 
-@pytest.mark.parametrize(
-    "hidden",
-    [
-        pytest.param(Hidden("sensor_gain", "catalogue", {"factor": 1.06}), marks=pytest.mark.slow),
-        pytest.param(
-            Hidden("rate_dependent_hood", "dashpot", {"damping": 40.0}),
-            marks=pytest.mark.slow,
-        ),
-        pytest.param(
-            Hidden("sensor_saturation", "catalogue", {"limit": 110.0}),
-            marks=pytest.mark.slow,
-        ),
-        Hidden("hood_bottoming", "catalogue", {"clearance": 0.03, "stiffness": 2e5}),
-    ],
-    ids=lambda h: h.name,
-)
-def test_an_effect_of_the_catalogue_is_named(
-    tmp_path: Path, hidden: Hidden, monkeypatch: pytest.MonkeyPatch
+BOTTOMING = Hidden("hood_bottoming", "catalogue", {"clearance": 0.03, "stiffness": 2e5})
+CATALOGUED = [
+    BOTTOMING,
+    Hidden("sensor_gain", "catalogue", {"factor": 1.06}),
+    Hidden("rate_dependent_hood", "dashpot", {"damping": 40.0}),
+    Hidden("sensor_saturation", "catalogue", {"limit": 110.0}),
+]
+FOREIGN = [Hidden("ageing", "", {"loss": 0.01}), Hidden("cable", "", {"size": 0.8})]
+
+
+@pytest.mark.parametrize(("hidden", "cause"), [([BOTTOMING], "hood_bottoming"), ([], None)])
+def test_a_few_tests_name_what_is_hidden_among_few_causes_and_nothing_else(
+    hidden: list[Hidden], cause: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    outcome = trial(tmp_path, [hidden], 21, monkeypatch)
+    where = "studies.validation.diagnosis.trial"
+    few = [c for c in causes_of("headform") if c.name in ("hood_bottoming", "sensor_offset")]
+    monkeypatch.setattr(f"{where}.Laboratory", partial(Laboratory, tests=5))
+    monkeypatch.setattr(f"{where}.causes_of", lambda _: few)
+    outcome = trial(hidden, 21, monkeypatch)
+    assert (outcome.cause, outcome.named, outcome.second) == (
+        cause,
+        (cause,) if cause else (),
+        None,
+    )
+    assert outcome.detected == (cause is not None)
+    assert (outcome.size > 2.0) if cause else outcome.size == 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hidden", CATALOGUED, ids=lambda h: h.name)
+def test_an_effect_of_the_catalogue_is_named(
+    hidden: Hidden, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    outcome = trial([hidden], 21, monkeypatch)
     assert outcome.size > 2.0
     assert outcome.cause == hidden.name
     assert outcome.second is None
 
 
-@pytest.mark.parametrize(
-    "hidden",
-    [
-        Hidden("ageing", "", {"loss": 0.01}),
-        pytest.param(Hidden("cable", "", {"size": 0.8}), marks=pytest.mark.slow),
-    ],
-    ids=lambda h: h.name,
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("hidden", FOREIGN, ids=lambda h: h.name)
 def test_an_effect_outside_the_catalogue_is_not_named(
-    tmp_path: Path, hidden: Hidden, monkeypatch: pytest.MonkeyPatch
+    hidden: Hidden, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    outcome = trial(tmp_path, [hidden], 22, monkeypatch)
+    outcome = trial([hidden], 22, monkeypatch)
     assert outcome.detected
     assert outcome.named == ()
 
 
-def test_nothing_hidden_nothing_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.slow
+def test_nothing_hidden_nothing_named(monkeypatch: pytest.MonkeyPatch) -> None:
     # An alarm may be false once in twenty; a name must not come of it.
-    outcome = trial(tmp_path, [], 23, monkeypatch)
+    outcome = trial([], 23, monkeypatch)
     assert outcome.named == ()
     assert outcome.size == 0.0
 

@@ -35,9 +35,6 @@ def planar() -> Run:
     return PLANAR.run({})
 
 
-# -- the case --------------------------------------------------------------------------------
-
-
 def test_the_nominal_crash_meets_the_rows_of_the_case(spatial: Run) -> None:
     # Multibody rows of Tables 1 and 2 and the dent, with the tolerances of the calibration.
     # Angular acceleration and effective mass are missed; the README says by how much.
@@ -92,9 +89,6 @@ def test_adults_high_fronts_and_gentle_bumps() -> None:
     assert bump.outputs["hic15"] < 100.0
 
 
-# -- accuracy --------------------------------------------------------------------------------
-
-
 def test_energy_is_booked_to_one_per_cent(spatial: Run) -> None:
     assert abs(spatial.outputs["energy_residual"]) < 0.01
     rng = np.random.default_rng(11)
@@ -146,13 +140,16 @@ def test_hic_has_a_limit_whatever_the_gait(gait_phase: float, facing_angle: floa
 
 
 @BOTH
-@pytest.mark.parametrize("tick", [1e-3, 2.1e-4, 9e-7, math.nan])
-def test_a_step_too_long_or_too_short_is_refused(build: Any, tick: float) -> None:
-    with pytest.raises(ValueError, match="tick must lie within 1e-6 and 2e-4"):
-        build(tick=tick)
-
-
-# -- what a run carries ----------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [*(("tick", t) for t in (1e-3, 2.1e-4, 9e-7, math.nan)),
+     *((f"{kind}_class", c) for kind in ("channel", "angular") for c in (-1.0, 1e6, math.nan))],
+)  # fmt: skip
+def test_a_step_or_a_filter_class_out_of_range_is_refused(
+    build: Any, option: str, value: float
+) -> None:
+    with pytest.raises(ValueError, match=f"{option} must lie within"):
+        build(**{option: value})
 
 
 def test_a_run_carries_histories_and_scene(spatial: Run) -> None:
@@ -206,9 +203,6 @@ def test_the_scene_is_the_spatial_body_turning_about_y(planar: Run, spatial: Run
         assert apart.max() < scene.semi_axes[a].max() + scene.semi_axes[b].max() + 0.05
 
 
-# -- the plane and the space -----------------------------------------------------------------
-
-
 def test_the_plane_has_the_inputs_of_the_space_and_makes_nothing_of_two() -> None:
     def declared(model: Model) -> list[tuple[Any, ...]]:
         return [(i.name, i.nominal, i.low, i.high, i.unit) for i in model.inputs]
@@ -240,9 +234,6 @@ def test_a_neck_that_stretches_unburdens_the_head() -> None:
     soft, stiff = (PLANAR.run({"neck_tension_stiffness": k}).outputs for k in (0.4, 4.0))
     assert stiff["effective_head_mass"] > soft["effective_head_mass"] + 0.05
     assert stiff["wad"] < soft["wad"] - 0.01
-
-
-# -- the head's first blow -------------------------------------------------------------------
 
 
 @kernel

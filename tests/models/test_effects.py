@@ -44,9 +44,6 @@ def test_the_crash_has_the_crash_effects() -> None:
     assert not set(effects_of("headform")) & CRASH
 
 
-# -- what was set up otherwise, and the sensor ------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("effects", "inputs"),
     [
@@ -122,9 +119,6 @@ def test_our_filter_is_that_of_scipy(size: int, channel_class: float) -> None:
                           (1.0 - math.sqrt(2.0) * wa + wa * wa) / scale]])  # fmt: skip
     theirs = sosfiltfilt(sections, x, axis=0, padlen=min(size - 1, 60))
     np.testing.assert_allclose(filter_cfc(x, 20_000.0, channel_class), theirs, atol=1e-11)
-
-
-# -- the hood --------------------------------------------------------------------------------
 
 
 def test_bottoming_begins_at_its_clearance_and_adds_its_stiffness() -> None:
@@ -210,9 +204,6 @@ def test_the_hoods_mass_takes_its_share_of_the_momentum(mass: float) -> None:
 def test_the_first_peak_of_a_heavy_hood_grows_with_the_square_of_the_speed() -> None:
     slow, fast = (heavy_hood(0.5, v).histories["hood"].channels["force"].max() for v in (5.0, 10.0))
     assert fast / slow == pytest.approx(4.0, rel=1e-2)
-
-
-# -- car, person and road of a crash ----------------------------------------------------------
 
 
 @pytest.mark.parametrize("model", ["multibody", "planar"])

@@ -48,9 +48,6 @@ def assert_same(found: dict[str, float], expected: dict[str, float]) -> None:
     assert found == pytest.approx(expected | known, rel=1e-9, abs=1e-12)
 
 
-# -- inputs and options ----------------------------------------------------------------------
-
-
 def test_nominal_inputs_are_the_headform_test_of_the_case() -> None:
     # 30 km/h, perpendicular, EEVC child headform of 2.5 kg and 130 mm (biomechanics.md 0 and 4.1).
     model, values = load_model("headform"), nominals()
@@ -142,9 +139,6 @@ def test_corridor_coordinate_and_force_scale_pick_the_struck_curve() -> None:
     stiff = [[0.0, 0.0], [0.1, 1.7e4]]
     scaled = outputs({"hood_curve": LINEAR}, hood_force_scale=1.7)
     assert_same(scaled, outputs({"hood_curve": stiff}))
-
-
-# -- closed forms ----------------------------------------------------------------------------
 
 
 @quiet(60)
@@ -250,9 +244,6 @@ def test_vinyl_skin_on_a_rigid_plate_and_on_a_hood() -> None:
     assert soft["hood_intrusion"] != bare["hood_intrusion"]
 
 
-# -- sliding ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("angle", [0.2, 1.3])
 def test_without_friction_only_the_normal_speed_counts(angle: float) -> None:
     model = load_model("headform")
@@ -290,9 +281,6 @@ def test_sliding_impulse_is_friction_times_normal_impulse() -> None:
     )
     spin = run.outputs["head_angular_velocity"]
     assert spin == pytest.approx(2.5 * lost * 0.065 / 0.0036, rel=1e-6)
-
-
-# -- any inputs ------------------------------------------------------------------------------
 
 
 @st.composite

@@ -39,9 +39,8 @@ class Reference(NamedTuple):
 
 def loading_force(depth: float) -> float:
     """Return the force (N) of the knots, with the last slope beyond them."""
-    for (d0, f0), (d1, f1) in itertools.pairwise(KNOTS):
-        if depth <= d1:
-            break
+    pairs = itertools.pairwise(KNOTS)
+    (d0, f0), (d1, f1) = next((pair for pair in pairs if depth <= pair[1][0]), KNOTS[-2:])
     return f0 + (f1 - f0) * (depth - d0) / (d1 - d0)
 
 
@@ -170,9 +169,6 @@ def test_law_integrated_independently(change: dict[str, float]) -> None:
 )
 def test_random_tests_integrated_independently(values: dict[str, float]) -> None:
     compare(values)
-
-
-# -- histories -------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")

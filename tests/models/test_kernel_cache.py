@@ -11,50 +11,45 @@ import pytest
 from models.compilation import digest_of
 
 CODE = "from models import compilation; import numba; print(numba.config.CACHE_DIR)"
+# Of a user without an entry pathlib finds no home.
+HOMELESS = """import pathlib
+def no_home(): raise RuntimeError('Could not determine home directory.')
+pathlib.Path.home = no_home
+"""
+PLACES = ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "HOME")
 
 
-def imported(**environment: str | None) -> subprocess.CompletedProcess[str]:
-    """Import the compilation in a fresh process; None takes a variable away."""
-    base = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
-    chosen = {key: value for key, value in {**base, **environment}.items() if value is not None}
-    return subprocess.run(
-        [sys.executable, "-c", CODE], env=chosen, capture_output=True, text=True, timeout=120,
-        check=True,
+def imported(code: str = CODE, **environment: str) -> tuple[Path, str]:
+    """Import the compilation in a fresh process; return its cache and what it says."""
+    kept = {key: value for key, value in os.environ.items() if key not in PLACES}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=kept | environment, capture_output=True, text=True,
+        timeout=120, check=True,
     )  # fmt: skip
+    return Path(done.stdout.strip()), done.stderr
 
 
 def test_the_users_cache_is_taken_in_silence(tmp_path: Path) -> None:
-    done = imported(XDG_CACHE_HOME=str(tmp_path))
-    assert done.stderr == ""
-    assert Path(done.stdout.strip()).parent == tmp_path / "mcstudy"
+    cache, told = imported(XDG_CACHE_HOME=str(tmp_path))
+    assert (cache.parent, told) == (tmp_path / "mcstudy", "")
 
 
-@pytest.mark.parametrize("how", ["a file stands there", "no such device"])
-def test_a_cache_that_cannot_be_written_is_replaced_with_one_line(tmp_path: Path, how: str) -> None:
-    other = tmp_path / "temporary"
-    other.mkdir()
-    wanted = tmp_path / "file"
-    wanted.write_text("")
-    place = str(wanted) if how == "a file stands there" else "/dev/null/none"
-    done = imported(XDG_CACHE_HOME=place, TMPDIR=str(other))
-    assert Path(done.stdout.strip()).parent == other
-    (line,) = done.stderr.splitlines()
+@pytest.mark.parametrize("place", ["file", "/dev/null/none"])
+def test_a_cache_that_cannot_be_written_is_replaced_with_one_line(
+    tmp_path: Path, place: str
+) -> None:
+    (tmp_path / "file").write_text("")
+    (tmp_path / "temporary").mkdir()
+    wanted, other = str(tmp_path / place), tmp_path / "temporary"
+    cache, told = imported(XDG_CACHE_HOME=wanted, TMPDIR=str(other))
+    assert cache.parent == other
+    (line,) = told.splitlines()
     assert line.startswith("mcstudy: ") and "cannot be written" in line
 
 
 def test_without_a_home_the_temporary_folder_is_taken(tmp_path: Path) -> None:
-    # Of a user without an entry pathlib finds no home.
-    code = "import pathlib\n" \
-           "def no_home(): raise RuntimeError('Could not determine home directory.')\n" \
-           "pathlib.Path.home = no_home\n" + CODE  # fmt: skip
-    kept = {k: v for k, v in os.environ.items()
-            if k not in ("HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR")}  # fmt: skip
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=kept | {"TMPDIR": str(tmp_path)}, capture_output=True,
-        text=True, timeout=120, check=True,
-    )  # fmt: skip
-    assert Path(done.stdout.strip()).parent == tmp_path
-    assert "there is no home folder" in done.stderr
+    cache, told = imported(HOMELESS + CODE, TMPDIR=str(tmp_path))
+    assert cache.parent == tmp_path and "there is no home folder" in told
 
 
 PLAIN = b"def double(x):\n    return 2.0 * x\n\nRATE = 3.0\n"
@@ -78,6 +73,7 @@ def test_any_other_edit_does(other: bytes) -> None:
     assert digest_of([PLAIN]) != digest_of([other])
 
 
+@pytest.mark.slow
 def test_a_comment_in_a_kernels_file_loads_the_cached_code(tmp_path: Path) -> None:
     # A copy of the package, so that its file can be edited.
     shutil.copytree(Path(__file__).parents[2] / "models", tmp_path / "models",

@@ -266,9 +266,6 @@ def test_bad_tests_are_refused(direction: str, pulse: Array, message: str) -> No
         swing_neck(BODY, JOINTS, direction, SPEED, pulse)
 
 
-# -- sled ------------------------------------------------------------------------------------
-
-
 def test_a_loose_head_on_a_stiff_neck_is_an_inverted_pendulum() -> None:
     centre, neck = ADULT.centre.copy(), ROWS[0]
     lever = float(centre[HEAD, 2] - ADULT.joint[HEAD, 2])

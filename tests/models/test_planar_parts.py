@@ -180,7 +180,8 @@ def test_in_free_flight_the_centre_falls_and_the_spin_stays() -> None:
 
 
 def test_a_slope_pulls() -> None:
-    space, mass = flying(Road(0.6, gravity_along=1.0, gravity_down=9.0)), BODY.mass / BODY.mass.sum()
+    road, mass = Road(0.6, gravity_along=1.0, gravity_down=9.0), BODY.mass / BODY.mass.sum()
+    space = flying(road)
     before = mass @ space.state[:N, 3:5]
     step(space, 100, 1e-3)
     np.testing.assert_allclose(mass @ space.state[:N, 3:5] - before, [0.1, -0.9], atol=1e-9)

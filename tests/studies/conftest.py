@@ -1,4 +1,4 @@
-"""What tests of studies on the headform share; a test module may have its own instead."""
+"""What tests of studies share; a test module may have its own instead."""
 
 from collections.abc import Iterator
 

@@ -8,31 +8,31 @@ import contextlib
 import io
 import itertools
 import math
+import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
 import numpy as np
 import pandas as pd
-import pytest
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mcstudy.execution.results import ResultsFolder
-from mcstudy.figures import style
-from mcstudy.report import document
+from mcstudy.injury import association
 from models.registry import load_model
-from studies import cli
-from studies import worker as evaluation
+from studies import cli, kind, stiffness, worker
+from studies.diagnosis import study as diagnosis
+from studies.injury import speed as injury_speed
 from studies.kinds import KINDS, parse_study
-from studies.monte_carlo import study as monte_carlo
-from studies.morris import study as morris
+from studies.publishing import publish
+from studies.risk_curve import study as risk_curve
 from studies.sensitivity import measure as sensitivity
 from studies.sobol import analysis as sobol_analysis
-from studies.sobol import study as sobol
 
 SPREADS = {"impact_speed": 0.12, "headform_mass": 0.2, "hood_force_scale": 0.3}
 EXPONENTS = {
@@ -62,17 +62,33 @@ HEAD = """\
 format = "mcstudy-study/1"
 kind = "{kind}"
 name = "headform_{kind}"
-title = "Headform & <script>hood</script>"
+title = "Headform & <script>hood</script> [bold]"
 seed = 11
 max_failure_rate = {limit}
-
-[model]
+"""
+HOOD = """
+[{table}]
 name = "headform"
 options = {{ hood_curve = [[0.0, 0.0], [0.1, {force}]], channel_class = 0.0 }}
-
-[design]
-{design}
 """
+INJURY = """
+[mechanisms.impact]
+functions = { nhtsa_lognormal = 1.0, prasad_mertz = 3.0 }
+[scenarios.slow]
+title = "slow <b> [red] $x$ %"
+[scenarios.slow.inputs.impact_speed]
+distribution = "lognormal"
+unit = "km/h"
+median = 24.0
+sigma = 0.12
+"""
+DESIGNS = {
+    "monte-carlo": "n = 120\nreplicate_size = 20",
+    "sobol": "n = 64",
+    "morris": "n = 16",
+    "injury": "n = 60\nreplicate_size = 10",
+    "model-comparison": "n = 60\nreplicate_size = 10",
+}
 # A hood of 1 kN/m times a scale: below SOFTEST the contact lasts more than a second and the run
 # fails, which one run in twenty does.
 SOFTEST = 0.0117
@@ -94,7 +110,7 @@ high = 40.0
 
 def study_text(
     kind: str,
-    design: str,
+    design: str = "",
     *,
     inputs: str = INPUTS,
     more: str = "",
@@ -102,12 +118,18 @@ def study_text(
     limit: float = 0.02,
     force: float = 10000.0,
 ) -> str:
-    """Return a study file of the headform on a straight hood."""
+    """Return a study file of the headform on a straight hood, or of two hoods."""
+    text = HEAD.format(kind=kind, limit=limit) + ("age = 7.5\n" if kind == "injury" else "")
+    hoods = {"model": force}
+    if kind == "model-comparison":
+        hoods = {"models.soft": force, "models.stiff": 2.0 * force}
+    text += "".join(HOOD.format(table=name, force=value) for name, value in hoods.items())
+    text += f"\n[design]\n{design or DESIGNS[kind]}\n{inputs}{more}"
+    if kind == "injury":
+        return text + INJURY
+    extra = {"monte-carlo": "histories = 0", "model-comparison": ""}.get(kind, "resamples = 100")
     listed = ", ".join(f'"{name}"' for name in outputs)
-    resamples = "" if kind == "monte-carlo" else "resamples = 100\n"
-    histories = "histories = 0\n" if kind == "monte-carlo" else ""
-    head = HEAD.format(kind=kind, design=design, limit=limit, force=force)
-    return f"{head}{inputs}{more}\n[report]\noutputs = [{listed}]\n{resamples}{histories}"
+    return f"{text}\n[report]\noutputs = [{listed}]\n{extra}\n"
 
 
 def run_text(text: str, folder: ResultsFolder, *, workers: int = 1) -> dict[str, Any]:
@@ -116,15 +138,20 @@ def run_text(text: str, folder: ResultsFolder, *, workers: int = 1) -> dict[str,
     return KINDS[study.kind].run(study, text, folder, workers=workers, quiet=True)
 
 
+GRAZING = 0.5
+"""rad: beyond this angle the formula's head has no blow."""
+
+
 def closed_form(
-    argument: Mapping[str, Any], rows: NDArray[np.float64], started: object
+    argument: Mapping[str, Any], rows: NDArray[np.float64], started: object = None
 ) -> tuple[NDArray[np.float64], list[str]]:
     """Return what the headform model returns, by formula and at once, where only rows matter."""
     model = load_model(argument["name"], argument["options"])
     places = [item.name for item in model.inputs]
-    v, m, k = (rows[:, places.index(name)] for name in SPREADS)
+    v, m, scale, angle = (rows[:, places.index(name)] for name in (*SPREADS, "impact_angle"))
+    k = scale * float(argument["options"]["hood_curve"][1][1]) / 10000.0
     found = {
-        "hic15": 6.0 * v**2.5 * m**-0.75 * k**0.75,
+        "hic15": np.where(angle > GRAZING, np.nan, 6.0 * v**2.5 * m**-0.75 * k**0.75),
         "peak_force": 316.0 * v * m**0.5 * k**0.5,
         "clip_3ms": 10.0 * v * k**0.3,
     }
@@ -132,9 +159,10 @@ def closed_form(
     for j, item in enumerate(model.outputs):
         if item.name in found:
             outputs[:, j] = found[item.name]
-    failed = k < SOFTEST
+    failed = scale < SOFTEST
     outputs[failed] = np.nan
-    return outputs, ["time_limit" if lost else "ok" for lost in failed]
+    ends = np.where(angle > GRAZING, "no_head_contact", "ok")
+    return outputs, np.where(failed, "time_limit", ends).tolist()
 
 
 def shares(output: str) -> dict[str, float]:
@@ -184,30 +212,47 @@ class Answer:
         return " ".join(self.out.split())
 
 
-def mcstudy(*arguments: str | Path) -> Answer:
+def mcstudy(*arguments: object) -> Answer:
     """Run the command line in this process."""
     out, err = io.StringIO(), io.StringIO()
     with (
         mock.patch.object(sys, "argv", ["mcstudy", *map(str, arguments)]),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
-        pytest.raises(SystemExit) as ended,
     ):
-        cli.main()
-    code = ended.value.code
-    assert isinstance(code, int)
-    return Answer(code, out.getvalue(), err.getvalue())
+        try:
+            cli.main()
+        except SystemExit as ended:
+            assert isinstance(ended.code, int)
+            return Answer(ended.code, out.getvalue(), err.getvalue())
+    raise AssertionError("the command line did not exit")
+
+
+def told(answer: Answer, code: int = 2) -> str:
+    """Return the one line with which a command refuses or fails."""
+    assert answer.code == code, answer
+    assert answer.out == ""
+    assert answer.err.startswith("mcstudy: ") and answer.err.count("\n") == 1, answer.err
+    return answer.err
+
+
+def assert_stands_alone(html: str) -> None:
+    """Check that a report needs no network and holds no script and no word of the program's."""
+    assert not re.search(r"<script|<link|<iframe|@import|url\(", html, re.IGNORECASE)
+    for link in re.findall(r'(?:src|href)="([^"]*)"', html):
+        assert link.startswith(("data:image/", "#")), link[:60]
+    words = re.sub(r"(?s)<style>.*?</style>|<[^>]+>", " ", html).replace("None of them", "")
+    assert not re.search(r"\b(nan|inf|None|null)\b", words)
 
 
 @contextlib.contextmanager
-def by_formula() -> Iterator[None]:
-    """Replace the headform model's runs by the closed form; one worker only.
-
-    The convergence figure's intervals get fewer resamples.
-    """
+def by_formula(evaluate: Any = closed_form) -> Iterator[None]:
+    """Replace the headform model's runs by a formula, and resample little; one worker only."""
     with (
-        mock.patch.object(evaluation, "evaluate", closed_form),
+        mock.patch.object(worker, "evaluate", evaluate),
         mock.patch.object(sobol_analysis, "STEP_RESAMPLES", 8),
+        mock.patch.object(association, "RESAMPLES", 4),
+        mock.patch.object(injury_speed, "RESAMPLES", 50),
     ):
         yield
 
@@ -216,17 +261,31 @@ class _AnyFigure(dict[str, Figure]):
     """An empty mapping of figures that has every one."""
 
     def __missing__(self, name: str) -> Figure:
-        return Figure()
+        return Figure(figsize=(0.1, 0.1))
 
 
 @contextlib.contextmanager
 def without_figures() -> Iterator[None]:
     """Leave drawing out of every report: it takes most of a small study's time."""
+
+    def undrawn(folder: ResultsFolder, title: str, subtitle: str, analysis: Any, _: Any,
+                sections_of: Any) -> dict[str, Any]:  # fmt: skip
+        return publish(folder, title, subtitle, analysis, lambda _: _AnyFigure(), sections_of)
+
     with contextlib.ExitStack() as stack:
-        for module in (monte_carlo, morris, sensitivity, sobol):
-            stack.enter_context(mock.patch.object(module, "draw", lambda *_: _AnyFigure()))
-        stack.enter_context(mock.patch.object(style, "save", lambda *_: None))
-        stack.enter_context(mock.patch.object(document, "png_bytes", lambda *_: b""))
+        for module in (kind, sensitivity, risk_curve, diagnosis):
+            stack.enter_context(mock.patch.object(module, "publish", undrawn))
+        yield
+
+
+@contextlib.contextmanager
+def quick_fits(draws: int = 4) -> Iterator[None]:
+    """Fit stiffness with few repetitions and without figures."""
+    quick = partial(stiffness.fit_stiffness, draws=draws)
+    with (
+        mock.patch.object(stiffness, "fit_stiffness", quick),
+        mock.patch.object(stiffness, "_draw", lambda *_: mock.MagicMock()),
+    ):
         yield
 
 

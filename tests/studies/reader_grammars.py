@@ -11,7 +11,7 @@ import io
 import json
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -102,57 +102,42 @@ def _inline(value: Any) -> str:
     return repr(value)
 
 
+def _keys(container: Any) -> Sequence[Any]:
+    return list(container) if isinstance(container, dict) else range(len(container))
+
+
 def places(tree: Any) -> list[tuple[Any, Any]]:
     """Return every container of a tree with each of its keys."""
-    found = []
-    keys = list(tree) if isinstance(tree, dict) else range(len(tree))
-    for key in keys:
-        found.append((tree, key))
-        if isinstance(tree[key], dict | list):
-            found += places(tree[key])
-    return found
+    inner = (tree[key] for key in _keys(tree) if isinstance(tree[key], dict | list))
+    return [(tree, key) for key in _keys(tree)] + [spot for part in inner for spot in places(part)]
+
+
+NAMED = st.sampled_from(WORDS) | st.text(max_size=8)
+SPOILS = ("value", "value", "value", "scale", "drop", "rename", "add", "swap", "wrap", "twin")
 
 
 def _spoil_tree(draw: Draw, tree: dict[str, Any]) -> None:
     """Change one place of a tree."""
-    spots = places(tree)
-    if not spots:
+    if not (spots := places(tree)):
         return
     container, key = draw(st.sampled_from(spots))
-    what = draw(st.sampled_from(
-        ["value", "value", "value", "scale", "drop", "rename", "add", "swap", "wrap", "twin"]
-    ))  # fmt: skip
-    old = container[key]
+    what, old, named = draw(st.sampled_from(SPOILS)), container[key], isinstance(container, dict)
     if what == "value":
         container[key] = draw(hostile_values())
     elif what == "scale" and isinstance(old, int | float) and not isinstance(old, bool):
         power = draw(st.sampled_from(["e5", "e-5", "e300", "e-300"]))
-        container[key] = Raw(f"{float(old):f}{power}" if isinstance(old, float) else str(-old))
+        container[key] = Raw(f"{old:f}{power}" if isinstance(old, float) else str(-old))
     elif what == "drop":
         del container[key]
-    elif what == "rename" and isinstance(container, dict):
-        container[draw(st.sampled_from(WORDS) | st.text(max_size=8))] = container.pop(key)
-    elif what == "add" and isinstance(container, dict):
-        container[draw(st.sampled_from(WORDS) | st.text(max_size=8))] = draw(hostile_values())
-    elif what == "add":
-        container.append(draw(hostile_values()))
+    elif what in ("rename", "add") and named:
+        container[draw(NAMED)] = container.pop(key) if what == "rename" else draw(hostile_values())
+    elif what in ("add", "twin") and not named:
+        container.append(copy.deepcopy(old) if what == "twin" else draw(hostile_values()))
     elif what == "swap":
         other, place = draw(st.sampled_from(spots))
         container[key] = copy.deepcopy(other[place]) if place in _keys(other) else old
     elif what == "wrap":
         container[key] = [old] if draw(st.booleans()) else {"a": old}
-    elif what == "twin" and isinstance(container, list):
-        container.append(copy.deepcopy(old))
-
-
-def _keys(container: Any) -> Sequence[Any]:
-    return list(container) if isinstance(container, dict) else range(len(container))
-
-
-SAVED = ("as it is", "as it is", "as it is", "mark", "crlf")
-"""How programs save a text that is all right."""
-DAMAGED = ("cr", "utf-16", "utf-16-be", "latin", "cut", "insert", "remove", "twice", "null",
-           "late mark")  # fmt: skip
 
 
 def seldom(draw: Draw, times: int) -> bool:
@@ -160,39 +145,40 @@ def seldom(draw: Draw, times: int) -> bool:
     return bool(draw(st.integers(0, times - 1)) == times - 1)
 
 
+def _doubled(raw: bytes, at: int) -> bytes:
+    lines = raw.split(b"\n")
+    k = at % len(lines)
+    return b"\n".join([*lines[: k + 1], *lines[k:]])
+
+
+MARK = b"\xef\xbb\xbf"
+SAVED: tuple[Callable[[bytes], bytes], ...] = (
+    bytes, bytes, bytes, lambda raw: MARK + raw, lambda raw: raw.replace(b"\n", b"\r\n")
+)  # fmt: skip
+"""How programs save a text that is all right."""
+DAMAGED: tuple[Callable[[bytes, int, bytes], bytes], ...] = (
+    lambda raw, at, junk: raw.replace(b"\n", b"\r"),
+    lambda raw, at, junk: raw.decode("utf-8", "replace").encode("utf-16"),
+    lambda raw, at, junk: b"\xfe\xff" + raw.decode("utf-8", "replace").encode("utf-16-be"),
+    lambda raw, at, junk: raw.replace(b"a", b"\xe4", 1),
+    lambda raw, at, junk: raw[:at],
+    lambda raw, at, junk: raw[:at] + junk + raw[at:],
+    lambda raw, at, junk: raw[:at] + raw[at + 1 + 6 * len(junk) :],
+    lambda raw, at, junk: _doubled(raw, at),
+    lambda raw, at, junk: raw[:at] + b"\0" + raw[at:],
+    lambda raw, at, junk: raw[:at] + MARK + raw[at:],
+)
+"""How files are damaged, at a place and with some junk."""
+
+
 @st.composite
 def spoilt_bytes(draw: Draw, text: str, often: int = 4) -> bytes:
     """Return a text as other programs save it, or once in so many times with damage."""
-    how = draw(st.sampled_from(DAMAGED if seldom(draw, often) else SAVED))
     raw = text.encode("utf-8", "surrogatepass")
-    at = draw(st.integers(0, len(raw)))
-    if how == "mark":
-        return b"\xef\xbb\xbf" + raw
-    if how == "crlf":
-        return raw.replace(b"\n", b"\r\n")
-    if how == "cr":
-        return raw.replace(b"\n", b"\r")
-    if how == "utf-16":
-        return b"\xff\xfe" + text.encode("utf-16-le", "surrogatepass")
-    if how == "utf-16-be":
-        return b"\xfe\xff" + text.encode("utf-16-be", "surrogatepass")
-    if how == "latin":
-        return text.replace("a", "ä", 1).encode("cp1252", "replace")
-    if how == "cut":
-        return raw[:at]
-    if how == "insert":
-        return raw[:at] + draw(st.binary(max_size=6)) + raw[at:]
-    if how == "remove":
-        return raw[:at] + raw[at + draw(st.integers(1, 40)) :]
-    if how == "twice":
-        lines = raw.split(b"\n")
-        k = draw(st.integers(0, len(lines) - 1))
-        return b"\n".join([*lines[: k + 1], *lines[k:]])
-    if how == "null":
-        return raw[:at] + b"\0" + raw[at:]
-    if how == "late mark":
-        return raw[:at] + b"\xef\xbb\xbf" + raw[at:]
-    return raw
+    if not seldom(draw, often):
+        return bytes(draw(st.sampled_from(SAVED))(raw))
+    at, junk = draw(st.integers(0, len(raw))), draw(st.binary(max_size=6))
+    return bytes(draw(st.sampled_from(DAMAGED))(raw, at, junk))
 
 
 # -- study files -----------------------------------------------------------------------------
@@ -291,111 +277,85 @@ UNITS = ("1", "%", "m", "mm", "kg", "g_mass", "km/h", "m/s", "mph", "deg", "rad"
          "furlong", "g", "kN", "°", "")  # fmt: skip
 
 
-@st.composite
-def numbers(draw: Draw) -> float:
-    """Return numbers, most of them of the size that studies have."""
-    kind = draw(st.sampled_from(["plain"] * 5 + ["wide", "huge"]))
-    if kind == "plain":
-        return round(draw(st.floats(0.0, 40.0)), 3)
-    if kind == "wide":
-        return draw(st.sampled_from([0.0, -1.0, -5.0, 1e-9, 1e9, 1e-3, 1e3, 1e6, 0.1, 1.0]))
-    return draw(st.sampled_from(
-        [1e308, -1e308, 1.7e308, 5e-324, -5e-324, 1e-308, 1e300, 1e-300, 1e150, 1e16]
-    ))  # fmt: skip
+_PLAIN = st.floats(0.0, 40.0).map(lambda value: round(value, 3))
+_WIDE = st.sampled_from([0.0, -1.0, -5.0, 1e-9, 1e9, 1e-3, 1e3, 1e6, 0.1, 1.0])
+_HUGE = st.sampled_from(
+    [1e308, -1e308, 1.7e308, 5e-324, -5e-324, 1e-308, 1e300, 1e-300, 1e150, 1e16]
+)
+SIZES = st.sampled_from([_PLAIN] * 5 + [_WIDE, _HUGE]).flatmap(lambda held: held)
+"""Numbers, most of them of the size that studies have."""
+_NAME, _UNIT, _WORD = (st.sampled_from(names) for names in (NAMES, UNITS, WORDS))
+_OUTPUT = st.sampled_from(["hic15", "peak_force", "clip_3ms", "permanent_dent", "wad", "nothing"])
 
 
-@st.composite
-def distributions(draw: Draw) -> dict[str, Any]:
-    """Return tables of distributions whose numbers need not fit each other."""
-    kind = draw(st.sampled_from(["uniform", "triangular", "normal", "lognormal", "growth-chart"]))
-    three = [draw(numbers()) for _ in range(3)]
-    if draw(st.integers(0, 3)):
-        three = sorted(three)
-    low, middle, high = three
-    table: dict[str, Any] = {"distribution": kind}
-    if kind == "uniform":
-        table |= {"low": low, "high": high}
-    elif kind == "triangular":
-        table |= {"low": low, "mode": middle, "high": high}
-    elif kind == "normal":
-        table |= {"mean": middle, "sd": draw(numbers())}
-    elif kind == "lognormal":
-        table |= {"median": middle, "sigma": draw(numbers())}
-    else:
-        count = draw(st.integers(1, 4))
-        table |= {"age": draw(st.sampled_from(NAMES))}
-        table |= {"at": sorted(draw(numbers()) for _ in range(count))}
-        table |= {key: [draw(numbers()) for _ in range(count)] for key in "LMS"}
-    if kind in ("normal", "lognormal", "growth-chart"):
-        if draw(st.booleans()):
-            table["low"] = low
-        if draw(st.booleans()):
-            table["high"] = high
-    if draw(st.booleans()):
-        table["unit"] = draw(st.sampled_from(UNITS))
-    return table
+def _table(optional: Sequence[str] = (), /, **keys: Any) -> st.SearchStrategy[dict[str, Any]]:
+    """Return tables with these keys, of a strategy or of one value, and perhaps some others."""
+    ends = {"low": SIZES, "high": SIZES, "unit": _UNIT}
+    held = {k: v if isinstance(v, st.SearchStrategy) else st.just(v) for k, v in keys.items()}
+    return st.fixed_dictionaries(held, optional={key: ends[key] for key in optional})
 
 
-def _vary_study(draw: Draw, tree: dict[str, Any]) -> None:
-    """Change something of a study that its grammar allows."""
-    what = draw(st.sampled_from(
-        ["input", "input", "fixed", "correlation", "design", "report", "title", "limit", "effect",
-         "option", "groups", "table"]
-    ))  # fmt: skip
-    name = draw(st.sampled_from(NAMES))
-    if what == "input" and isinstance(tree.get("inputs"), dict):
-        tree["inputs"][name] = draw(distributions())
-    elif what == "fixed":
-        tree.setdefault("fixed", {})[name] = {
-            "value": draw(numbers()), "unit": draw(st.sampled_from(UNITS))
-        }  # fmt: skip
-    elif what == "correlation":
-        pairs = st.tuples(st.sampled_from(NAMES), st.sampled_from(NAMES), st.floats(-1.1, 1.1))
-        tree["dependence"] = {"correlations": [list(draw(pairs)) for _ in range(draw(
-            st.integers(0, 4)))]}  # fmt: skip
-    elif what == "design":
-        method = draw(st.sampled_from(["monte-carlo", "latin-hypercube", "sobol"]))
-        size = draw(st.sampled_from([1, 2, 4, 10, 16, 20, 64, 1000]))
-        tree["design"] = {"method": method, "n": size * draw(st.integers(1, 5))}
-        if draw(st.booleans()):
-            tree["design"]["replicate_size"] = size
-    elif what == "report":
-        outputs = ["hic15", "peak_force", "clip_3ms", "permanent_dent", "wad", "nothing"]
-        tree["report"] = {"outputs": draw(st.lists(st.sampled_from(outputs), max_size=4))}
-        if draw(st.booleans()):
-            tree["report"]["references"] = [
-                {"output": draw(st.sampled_from(outputs)), "value": draw(numbers()),
-                 "label": draw(st.sampled_from(WORDS)), "unit": draw(st.sampled_from(UNITS)),
-                 "kind": draw(st.sampled_from(["observed", "limit", "simulated"]))}
-                for _ in range(draw(st.integers(0, 3)))
-            ]  # fmt: skip
-    elif what == "title":
-        tree["title"] = draw(st.sampled_from(WORDS) | st.text(max_size=20))
-    elif what == "limit" and tree.get("kind") == "injury":
-        tree["limit"] = {"output": draw(st.sampled_from(["hic15", "peak_force", "wad"])),
-                         "value": draw(numbers()), "level": draw(st.integers(0, 7))}  # fmt: skip
-    elif what == "effect":
-        effects = ["sensor_gain", "mass_error", "hood_bottoming", "rate_dependent_hood", "nothing"]
-        tree["effects"] = {draw(st.sampled_from(effects)): {
-            draw(st.sampled_from(["factor", "error", "depth", "stiffness", "exponent", "a"])):
-            draw(numbers())}}  # fmt: skip
-    elif what == "option" and isinstance(tree.get("model"), dict):
-        pairs = [[draw(numbers()), draw(numbers())] for _ in range(draw(st.integers(0, 4)))]
-        tree["model"]["options"] = {
-            "hood_curve": [[0.0, 0.0], *sorted(pairs)],
-            "channel_class": draw(st.sampled_from([0.0, 60.0, 180.0, 600.0, 1000.0, -1.0, 1e308])),
-        }
-    elif what == "groups":
-        tree["groups"] = {draw(st.sampled_from([*NAMES, *WORDS])): draw(
-            st.lists(st.sampled_from(NAMES), max_size=3))}  # fmt: skip
-    elif what == "table" and isinstance(tree.get("tables"), list):
-        tree["tables"] = [{
-            "title": draw(st.sampled_from(WORDS)),
-            "units": {draw(st.sampled_from(["hic15", "peak_force", "wad"])):
-                      draw(st.sampled_from(UNITS))},
-            "rows": [{"label": draw(st.sampled_from(WORDS)),
-                      "values": {"hic15": draw(numbers())}}],
-        }]  # fmt: skip
+def _in_order(table: dict[str, Any]) -> dict[str, Any]:
+    names = [key for key in ("low", "mode", "mean", "median", "high") if key in table]
+    return table | dict(zip(names, sorted(table[key] for key in names), strict=True))
+
+
+_ENDS, _FEW = ("low", "high", "unit"), st.lists(SIZES, min_size=1, max_size=4)
+_ANY_ORDER = st.one_of(
+    _table(("unit",), distribution="uniform", low=SIZES, high=SIZES),
+    _table(("unit",), distribution="triangular", low=SIZES, mode=SIZES, high=SIZES),
+    _table(_ENDS, distribution="normal", mean=SIZES, sd=SIZES),
+    _table(_ENDS, distribution="lognormal", median=SIZES, sigma=SIZES),
+    _table(_ENDS, distribution="growth-chart", age=_NAME, at=_FEW.map(sorted), L=_FEW, M=_FEW,
+           S=_FEW),
+)  # fmt: skip
+DISTRIBUTIONS = st.one_of(_ANY_ORDER, *[_ANY_ORDER.map(_in_order)] * 3)
+"""Tables of distributions whose numbers need not fit each other."""
+_SIZE = st.sampled_from([1, 2, 4, 10, 16, 20, 64, 1000])
+_METHOD = st.sampled_from(["monte-carlo", "latin-hypercube", "sobol"])
+_KINDS = st.sampled_from(["observed", "limit", "simulated"])
+_CLASS = st.sampled_from([0.0, 60.0, 180.0, 600.0, 1000.0, -1.0, 1e308])
+_EFFECT = st.sampled_from(
+    ["sensor_gain", "mass_error", "hood_bottoming", "rate_dependent_hood", "nothing"]
+)
+_PARAMETER = st.sampled_from(["factor", "error", "depth", "stiffness", "exponent", "a"])
+_KNOTS = st.lists(st.lists(SIZES, min_size=2, max_size=2), max_size=4)
+VARIATIONS: dict[tuple[str, ...], st.SearchStrategy[Any]] = {
+    ("title",): _WORD | st.text(max_size=20),
+    ("inputs", "*"): DISTRIBUTIONS,
+    ("inputs", "impact_speed"): DISTRIBUTIONS,
+    ("fixed", "*"): _table(value=SIZES, unit=_UNIT),
+    ("dependence",): _table(correlations=st.lists(
+        st.tuples(_NAME, _NAME, st.floats(-1.1, 1.1)).map(list), max_size=4)),
+    ("design",): st.tuples(_METHOD, _SIZE, st.integers(1, 5), st.booleans()).map(
+        lambda held: {"method": held[0], "n": held[1] * held[2]}
+        | ({"replicate_size": held[1]} if held[3] else {})),
+    ("report",): st.fixed_dictionaries(
+        {"outputs": st.lists(_OUTPUT, max_size=4)},
+        optional={"references": st.lists(
+            _table(output=_OUTPUT, value=SIZES, label=_WORD, unit=_UNIT, kind=_KINDS), max_size=3)},
+    ),
+    ("limit",): _table(output=_OUTPUT, value=SIZES, level=st.integers(0, 7)),
+    ("effects",): st.dictionaries(
+        _EFFECT, st.dictionaries(_PARAMETER, SIZES, min_size=1, max_size=1), min_size=1, max_size=1
+    ),
+    ("model", "options"): _table(
+        hood_curve=_KNOTS.map(lambda knots: [[0.0, 0.0], *sorted(knots)]), channel_class=_CLASS),
+    ("groups",): st.dictionaries(_NAME | _WORD, st.lists(_NAME, max_size=3), max_size=1),
+    ("tables",): st.tuples(_WORD, _OUTPUT, _UNIT, _WORD, SIZES).map(
+        lambda held: [{"title": held[0], "units": {held[1]: held[2]},
+                       "rows": [{"label": held[3], "values": {"hic15": held[4]}}]}]),
+}  # fmt: skip
+"""What of a study is varied within its grammar; ``*`` is any name."""
+
+
+def _vary(draw: Draw, tree: dict[str, Any], variations: Mapping[tuple[str, ...], Any]) -> None:
+    own = {"limit": tree.get("kind") == "injury", "inputs": "inputs" in tree,
+           "model": "model" in tree, "tables": "tables" in tree}  # fmt: skip
+    table, *inner = draw(st.sampled_from([p for p in variations if own.get(p[0], True)]))
+    place = tree.setdefault(table, {}) if inner else tree
+    key = inner[0] if inner else table
+    place[draw(_NAME) if key == "*" else key] = draw(variations[table, *inner])
 
 
 @st.composite
@@ -403,7 +363,7 @@ def study_trees(draw: Draw, studies: Mapping[str, Any], *, spoilt: bool = True) 
     """Return trees of study files: some of their values varied, some of them spoilt."""
     tree: dict[str, Any] = copy.deepcopy(dict(studies[draw(st.sampled_from(sorted(studies)))]))
     for _ in range(draw(st.integers(0, 3))):
-        _vary_study(draw, tree)
+        _vary(draw, tree, VARIATIONS)
     if spoilt:
         for _ in range(draw(st.sampled_from([0, 1, 1, 1, 2, 3]))):
             _spoil_tree(draw, tree)
@@ -510,20 +470,6 @@ def csv_files(draw: Draw) -> bytes:
     return raw
 
 
-@st.composite
-def parquet_tables(draw: Draw) -> pa.Table:
-    """Return tables of cases with columns of any type that Parquet has."""
-    head, rows = draw(case_columns())
-    names, arrays = [], []
-    for k, name in enumerate(head):
-        fields = [row[k] for row in rows]
-        names.append(draw(st.sampled_from(head)) if seldom(draw, 40) else name)
-        arrays.append(draw(_arrow_columns(fields)))
-    if seldom(draw, 40):
-        names, arrays = [], []
-    return pa.table(arrays, names=names)
-
-
 def _plain(text: str) -> float:
     try:
         return float(text)
@@ -531,59 +477,64 @@ def _plain(text: str) -> float:
         return math.nan
 
 
+def _integers(values: Sequence[float], top: int) -> list[int | None]:
+    return [int(v) % top if math.isfinite(v) and abs(v) < 2**62 else None for v in values]
+
+
+DAY = datetime.datetime(2020, 1, 1)
+Column = Callable[[list[str], list[float]], Any]
+COLUMNS: dict[str, tuple[int, Column]] = {
+    "float64": (20, lambda _, v: pa.array(v, pa.float64())),
+    "whole": (12, lambda _, v: pa.array([k or 0 for k in _integers(v, 2**62)], pa.int64())),
+    "nullable": (1, lambda _, v: pa.array(_integers(v, 2**62), pa.int64())),
+    "float32": (1, lambda _, v: pa.array(np.array(v).astype("float32"))),
+    "float16": (1, lambda _, v: pa.array(np.array(v).astype("float16"))),
+    "int8": (1, lambda _, v: pa.array(_integers(v, 100), pa.int8())),
+    "uint64": (1, lambda _, v: pa.array(_integers(v, 2**62), pa.uint64())),
+    "bool": (1, lambda _, v: pa.array([None if math.isnan(k) else k > 0.5 for k in v], pa.bool_())),
+    "string": (1, lambda f, _: pa.array(f, pa.string())),
+    "large": (1, lambda f, _: pa.array(f, pa.large_string())),
+    "category": (1, lambda f, _: pa.array(f, pa.string()).dictionary_encode()),
+    "bytes": (1, lambda f, _: pa.array([k.encode("utf-8", "replace") for k in f], pa.binary())),
+    "datetime": (1, lambda f, _: pa.array([DAY] * len(f), pa.timestamp("us"))),
+    "date": (1, lambda f, _: pa.array([DAY.date()] * len(f), pa.date32())),
+    "time": (1, lambda f, _: pa.array([DAY.time()] * len(f), pa.time64("us"))),
+    "duration": (1, lambda f, _: pa.array([DAY - DAY] * len(f), pa.duration("us"))),
+    "decimal": (1, lambda _, v: pa.array(
+        [decimal.Decimal(k or 0) for k in _integers(v, 2**62)], pa.decimal128(38, 3))),
+    "list": (1, lambda _, v: pa.array([[k] for k in v], pa.list_(pa.float64()))),
+    "dict": (1, lambda _, v: pa.array([{"a": k} for k in v], pa.struct([("a", pa.float64())]))),
+    "null": (1, lambda f, _: pa.nulls(len(f))),
+    "mixed": (1, lambda _, v: pa.array([None if j % 3 else k for j, k in enumerate(v)],
+                                       pa.float64())),
+}  # fmt: skip
+"""Types of a column of Parquet: how often, and what becomes of its fields and their numbers."""
+
+
 @st.composite
-def _arrow_columns(draw: Draw, fields: Sequence[str]) -> pa.Array:
-    """Return a column of Parquet in which fields stand as one of its types."""
-    values = [_plain(text) for text in fields]
-    kind = draw(st.sampled_from(
-        ["float64"] * 20 + ["whole"] * 12
-        + ["float32", "float16", "int8", "uint64", "bool", "string", "category", "nullable",
-           "datetime", "date", "time", "duration", "decimal", "list", "dict", "bytes", "null",
-           "mixed", "large"]
-    ))  # fmt: skip
-    whole = [int(v) if math.isfinite(v) and abs(v) < 2**62 else None for v in values]
-    if kind == "whole":
-        return pa.array([0 if v is None else v for v in whole], pa.int64())
-    if kind == "nullable":
-        return pa.array(whole, pa.int64())
-    if kind in ("float32", "float16"):
+def parquet_files(draw: Draw) -> bytes:
+    """Return tables of cases with columns of any type that Parquet has, some of them torn."""
+    head, rows = draw(case_columns())
+    kinds = st.sampled_from([make for often, make in COLUMNS.values() for _ in range(often)])
+    names, arrays = [], []
+    for k, name in enumerate(head):
+        fields = [row[k] for row in rows]
+        names.append(draw(st.sampled_from(head)) if seldom(draw, 40) else name)
         with np.errstate(over="ignore"):
-            return pa.array(np.array(values, dtype=kind))
-    if kind == "int8":
-        return pa.array([None if v is None else v % 100 for v in whole], pa.int8())
-    if kind == "uint64":
-        return pa.array([None if v is None else abs(v) * 4 for v in whole], pa.uint64())
-    if kind == "bool":
-        return pa.array([None if math.isnan(v) else v > 0.5 for v in values], pa.bool_())
-    if kind == "string":
-        return pa.array(list(fields), pa.string())
-    if kind == "category":
-        return pa.array(list(fields), pa.string()).dictionary_encode()
-    if kind == "datetime":
-        start = datetime.datetime(2020, 1, 1)
-        return pa.array([start + datetime.timedelta(days=k) for k in range(len(fields))])
-    if kind == "date":
-        return pa.array([datetime.date(2020, 1, 1) for _ in fields], pa.date32())
-    if kind == "time":
-        return pa.array([datetime.time(7, 32) for _ in fields], pa.time64("us"))
-    if kind == "duration":
-        return pa.array([datetime.timedelta(seconds=k) for k in range(len(fields))],
-                        pa.duration("us"))  # fmt: skip
-    if kind == "decimal":
-        return pa.array([decimal.Decimal(v or 0) for v in whole], pa.decimal128(38, 3))
-    if kind == "list":
-        return pa.array([[v] for v in values], pa.list_(pa.float64()))
-    if kind == "dict":
-        return pa.array([{"a": v} for v in values], pa.struct([("a", pa.float64())]))
-    if kind == "bytes":
-        return pa.array([text.encode("utf-8", "replace") for text in fields], pa.binary())
-    if kind == "null":
-        return pa.nulls(len(fields))
-    if kind == "mixed":
-        return pa.array([None if k % 3 else v for k, v in enumerate(values)], pa.float64())
-    if kind == "large":
-        return pa.array(list(fields), pa.large_string())
-    return pa.array(values, pa.float64())
+            arrays.append(draw(kinds)(fields, [_plain(text) for text in fields]))
+    if seldom(draw, 40):
+        names, arrays = [], []
+    sink = io.BytesIO()
+    try:
+        parquet.write_table(pa.table(arrays, names=names), sink)
+    except (pa.ArrowException, ValueError):
+        # What Parquet itself has no place for.
+        return b"PAR1"
+    raw = sink.getvalue()
+    if not seldom(draw, 6):
+        return raw
+    at = draw(st.integers(0, len(raw) - 1))
+    return draw(st.sampled_from([raw[:at], raw[:at] + b"\xff" + raw[at + 1 :], raw[at:], b""]))
 
 
 # -- headform tests --------------------------------------------------------------------------
@@ -685,36 +636,28 @@ def _mme_test(draw: Draw, name: str, place: str) -> dict[str, bytes]:
 
 
 def _spoil_mme(draw: Draw, file: MmeFile) -> None:
+    ways = ["value", "value", "drop", "twice", "case", "no colon"]
     what = draw(st.sampled_from(
-        ["value", "value", "drop", "twice", "case", "no colon", "sample", "sample", "cut", "more",
-         "all"] if file.samples else ["value", "value", "drop", "twice", "case", "no colon"]
+        [*ways, "sample", "sample", "cut", "more", "all"] if file.samples else ways
     ))  # fmt: skip
-    if what in ("sample", "cut", "more", "all"):
-        at = draw(st.integers(0, len(file.samples) - 1))
-        if what == "sample":
-            file.samples[at] = draw(st.sampled_from(SAMPLES))
-        elif what == "cut":
-            del file.samples[at:]
-        elif what == "more":
-            file.samples += draw(st.lists(st.sampled_from(SAMPLES), min_size=1, max_size=3))
-        else:
-            file.samples[:] = [draw(st.sampled_from(SAMPLES))] * len(file.samples)
-        return
-    if not file.header:
-        return
-    at = draw(st.integers(0, len(file.header) - 1))
-    key, value = file.header[at]
-    if what == "value":
-        pool = st.sampled_from(CODES if key == "Channel code" else HEADER_VALUES)
-        file.header[at] = (key, draw(pool | st.sampled_from(HEADER_VALUES)))
-    elif what == "drop":
-        del file.header[at]
-    elif what == "twice":
-        file.header.append((key, draw(st.sampled_from(HEADER_VALUES))))
-    elif what == "case":
-        file.header[at] = (draw(st.sampled_from([key.upper(), key.lower(), f" {key} "])), value)
-    else:
-        file.header[at] = (key.replace(" ", ":", 1), value)
+    samples, head = file.samples, file.header
+    at = draw(st.integers(0, max(0, len(samples if what in ("sample", "cut") else head) - 1)))
+    if what == "cut":
+        del samples[at:]
+    elif what in ("sample", "all"):
+        where = slice(at, at + 1) if what == "sample" else slice(None)
+        samples[where] = [draw(st.sampled_from(SAMPLES))] * len(samples[where])
+    elif what == "more":
+        samples += draw(st.lists(st.sampled_from(SAMPLES), min_size=1, max_size=3))
+    elif head:
+        key, value = head.pop(at)
+        pool = (*CODES, *HEADER_VALUES) if key == "Channel code" else HEADER_VALUES
+        other = draw(st.sampled_from(pool))
+        spelt = draw(st.sampled_from([key.upper(), key.lower(), f" {key} "]))
+        head[at:at] = {
+            "value": [(key, other)], "drop": [], "twice": [(key, value), (key, other)],
+            "case": [(spelt, value)], "no colon": [(key.replace(" ", ":", 1), value)],
+        }[what]  # fmt: skip
 
 
 @st.composite
@@ -752,7 +695,7 @@ def measured_folders(draw: Draw) -> dict[str, bytes]:
     tree = copy.deepcopy(MEASURED)
     count = draw(st.sampled_from([3, 3, 4, 1, 0]))
     for _ in range(draw(st.sampled_from([0, 0, 0, 1, 1, 2]))):
-        _vary_measured(draw, tree)
+        _vary(draw, tree, VARIED)
     for _ in range(draw(st.sampled_from([0, 0, 0, 0, 1, 2]))):
         _spoil_tree(draw, tree)
     odd = st.sampled_from(["H0", "a b", "é", "..", "", "1", "[x]*:"])
@@ -773,23 +716,22 @@ def measured_folders(draw: Draw) -> dict[str, bytes]:
     return files
 
 
-def _vary_measured(draw: Draw, tree: dict[str, Any]) -> None:
-    table = draw(st.sampled_from(["uncertain", "inputs", "scalars", "signals", "fixed", "model"]))
-    name = draw(st.sampled_from([*NAMES, "hic15", "head_acceleration", "hood_force", "ais"]))
-    if table == "model":
-        tree["model"] = draw(st.sampled_from(["headform", "multibody", "planar", *WORDS[:6]]))
-    elif table == "uncertain":
-        tree[table][name] = draw(distributions())
-    elif table == "fixed":
-        tree[table][name] = draw(st.one_of(
-            numbers(), st.lists(st.lists(numbers(), min_size=2, max_size=2), max_size=3)
-        ))  # fmt: skip
-    else:
-        entry: dict[str, Any] = {"unit": draw(st.sampled_from(UNITS)), "sd": draw(numbers())}
-        if table == "signals" and draw(st.booleans()):
-            entry["filter"] = draw(st.sampled_from(["none", "CFC60", "CFC1000", "CFC7"]))
-        own = list(tree[table])
-        tree[table][draw(st.sampled_from([*own, name]))] = entry
+_SIGNAL = st.sampled_from(["hic15", "head_acceleration", "hood_force", "ais", *NAMES])
+_MEASURED_AS = _table(unit=_UNIT, sd=SIZES)
+VARIED: dict[tuple[str, ...], st.SearchStrategy[Any]] = {
+    ("model",): st.sampled_from(["headform", "multibody", "planar", *WORDS[:6]]),
+    ("uncertain", "*"): DISTRIBUTIONS,
+    ("fixed", "*"): SIZES | _KNOTS,
+    ("inputs", "*"): _MEASURED_AS,
+    ("inputs", "impact_speed"): _MEASURED_AS,
+    ("scalars", "hic15"): _MEASURED_AS,
+    ("scalars",): st.dictionaries(_SIGNAL, _MEASURED_AS, max_size=1),
+    ("signals",): st.dictionaries(_SIGNAL, _MEASURED_AS, max_size=1),
+    ("signals", "head_acceleration"): st.tuples(
+        _MEASURED_AS, st.sampled_from(["none", "CFC60", "CFC1000", "CFC7"])
+    ).map(lambda held: held[0] | {"filter": held[1]}),
+}
+"""What of the header of measured data is varied within its grammar."""
 
 
 @st.composite
@@ -811,22 +753,6 @@ def _table_bytes(draw: Draw, rows: list[list[str]]) -> bytes:
     )
     raw: bytes = draw(spoilt_bytes(text + "\n", 20))
     return raw
-
-
-@st.composite
-def parquet_files(draw: Draw) -> bytes:
-    """Return Parquet tables of cases, some of them torn."""
-    sink = io.BytesIO()
-    try:
-        parquet.write_table(draw(parquet_tables()), sink)
-    except (pa.ArrowException, ValueError):
-        # What Parquet itself has no place for.
-        return b"PAR1"
-    raw = sink.getvalue()
-    if not seldom(draw, 6):
-        return raw
-    at = draw(st.integers(0, len(raw) - 1))
-    return draw(st.sampled_from([raw[:at], raw[:at] + b"\xff" + raw[at + 1 :], raw[at:], b""]))
 
 
 @st.composite

@@ -1,6 +1,5 @@
 """Outputs and inputs that do not vary, and numbers of any size: in words, drawn, no warning."""
 
-import contextlib
 import html
 import re
 from collections.abc import Iterator, Mapping
@@ -12,11 +11,13 @@ import numpy as np
 import pytest
 from headform_studies import (
     INPUTS,
+    by_formula,
     closed_form,
     copy_of,
     mcstudy,
     run_text,
     study_text,
+    without_figures,
 )
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
@@ -28,20 +29,12 @@ from mcstudy.figures import style
 from mcstudy.report import document
 from models.registry import load_model
 from studies import api
-from studies import worker as evaluation
-from studies.injury import speed as injury_speed
-from studies.injury import study as injury
-from studies.sobol import analysis as sobol_analysis
 
 pytestmark = pytest.mark.filterwarnings("error")
 
 Figures = dict[str, Figure]
+Results = tuple[NDArray[np.float64], list[str]]
 
-DESIGNS = {
-    "monte-carlo": "n = 120\nreplicate_size = 20",
-    "sobol": "n = 64",
-    "morris": "n = 8",
-}
 FLAT_SPEED = """
 [inputs.impact_speed]
 distribution = "uniform"
@@ -56,61 +49,22 @@ unit = "km/h"
 low = 29.0
 high = 31.0
 """
-HOODS = """\
-format = "mcstudy-study/1"
-kind = "model-comparison"
-name = "two_hoods"
-title = "Two hoods"
-
-[models.soft]
-name = "headform"
-options = { hood_curve = [[0.0, 0.0], [0.1, 10000.0]] }
-
-[models.stiff]
-name = "headform"
-options = { hood_curve = [[0.0, 0.0], [0.1, 20000.0]] }
-
-[design]
-n = 40
-replicate_size = 10
-"""
-INJURY = """\
-format = "mcstudy-study/1"
-kind = "injury"
-name = "headform_injury"
-title = "Injuries"
-age = 7.5
-max_failure_rate = 1.0
-
-[model]
-name = "headform"
-options = { hood_curve = [[0.0, 0.0], [0.1, 10000.0]] }
-
-[design]
-n = 120
-replicate_size = 20
-
-[mechanisms.impact]
-functions = { nhtsa_lognormal = 1.0, prasad_mertz = 3.0 }
-
-[scenarios.slower]
-title = "_slower [red] $x$ %"
-[scenarios.slower.inputs.impact_speed]
-distribution = "lognormal"
-unit = "km/h"
-median = 24.0
-sigma = 0.12
-"""
 
 
-def rounded(
-    argument: Mapping[str, Any], rows: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], list[str]]:
+def rounded(argument: Mapping[str, Any], rows: NDArray[np.float64], started: object) -> Results:
     """Return what the formula gives, with a HIC15 that rounding alone tells from 700.1."""
     outputs, _ = closed_form(argument, rows)
     names = [item.name for item in load_model(argument["name"], argument["options"]).outputs]
     outputs[:, names.index("hic15")] = 700.1 * (1.0 + 1e-15 * np.round(rows[:, 0] % 1.0 * 5.0))
     return outputs, ["ok"] * len(rows)
+
+
+def harmless(argument: Mapping[str, Any], rows: NDArray[np.float64], started: object) -> Results:
+    return 0.0 * rounded(argument, rows, started)[0], ["ok"] * len(rows)
+
+
+def failing(argument: Mapping[str, Any], rows: NDArray[np.float64], started: object) -> Results:
+    return np.nan * rounded(argument, rows, started)[0], ["time_limit"] * len(rows)
 
 
 @pytest.fixture(autouse=True)
@@ -125,13 +79,22 @@ def drawn() -> Iterator[Figures]:
             figure.draw_without_rendering()
 
     with (
-        mock.patch.object(evaluation, "evaluate", rounded),
+        by_formula(rounded),
         mock.patch.object(style, "save", save),
         mock.patch.object(document, "png_bytes", lambda *_: b""),
-        mock.patch.object(sobol_analysis, "STEP_RESAMPLES", 8),
-        mock.patch.object(injury_speed, "RESAMPLES", 20),
     ):
         yield held
+
+
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ResultsFolder]:
+    """Return a finished folder of each kind, of an output that varies."""
+    base = tmp_path_factory.mktemp("sources")
+    with by_formula(), without_figures():
+        return {
+            kind: ran(study_text(kind, inputs=ONE_SPEED, outputs=("hic15",)), base / kind)
+            for kind in ("monte-carlo", "sobol", "morris")
+        }
 
 
 def words_of(folder: ResultsFolder) -> str:
@@ -159,21 +122,6 @@ def cells_of(figure: Figure) -> list[str]:
     return [text.get_text() for text in figure.axes[0].texts]
 
 
-@pytest.fixture(scope="module")
-def sources(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ResultsFolder]:
-    """Return a finished folder of each kind, of an output that varies."""
-    base = tmp_path_factory.mktemp("sources")
-    with contextlib.ExitStack() as stack:
-        stack.enter_context(mock.patch.object(evaluation, "evaluate", closed_form))
-        stack.enter_context(mock.patch.object(style, "save", lambda *_: None))
-        stack.enter_context(mock.patch.object(document, "png_bytes", lambda *_: b""))
-        return {
-            kind: ran(study_text(kind, DESIGNS[kind], inputs=ONE_SPEED, outputs=("hic15",)),
-                      base / kind)
-            for kind in DESIGNS
-        }  # fmt: skip
-
-
 # -- each kind of study -----------------------------------------------------------------------
 
 
@@ -183,7 +131,7 @@ def test_monte_carlo_says_and_draws_what_is_constant(tmp_path: Path, drawn: Figu
         'references = [{ output = "hic15", value = 650.0, label = "_limit of 2020" },'
         ' { output = "hic15", value = 1e250, label = "far" }]\n'
     )
-    text = study_text("monte-carlo", DESIGNS["monte-carlo"], inputs=inputs)
+    text = study_text("monte-carlo", inputs=inputs)
     folder = ran(text + references, tmp_path / "out")
     assert "HIC15 does not vary: it is 700.1 in all 120 runs." in words_of(folder)
     entry = folder.read_json("analysis.json")["outputs"]["hic15"]
@@ -204,18 +152,8 @@ def test_monte_carlo_says_and_draws_what_is_constant(tmp_path: Path, drawn: Figu
     assert 600.0 < low < 700.0 < high < 800.0
 
 
-def test_an_output_without_a_value_is_said_to_have_none(
-    sources: dict[str, ResultsFolder], tmp_path: Path
-) -> None:
-    source = sources["monte-carlo"]
-    none = copy_of(source, tmp_path / "none", source.runs().assign(hic15=np.nan))
-    answer = mcstudy("report", none.path)
-    assert answer.code == 0, answer.err
-    assert "HIC15: no run has a value." in words_of(none)
-
-
 def test_sobol_says_and_hatches_a_constant(tmp_path: Path, drawn: Figures) -> None:
-    folder = ran(study_text("sobol", DESIGNS["sobol"]), tmp_path / "out")
+    folder = ran(study_text("sobol"), tmp_path / "out")
     text = words_of(folder)
     assert "HIC15 does not vary." in text
     assert "No index is given where an output does not vary: HIC15, HIC36," in text
@@ -240,7 +178,7 @@ def test_an_output_that_hardly_ever_changes_has_indices_without_intervals(
 
 
 def test_morris_says_a_constant_and_draws_the_others(tmp_path: Path, drawn: Figures) -> None:
-    folder = ran(study_text("morris", DESIGNS["morris"]), tmp_path / "out")
+    folder = ran(study_text("morris"), tmp_path / "out")
     assert "HIC15 does not vary." in words_of(folder)
     factors = folder.read_json("analysis.json")["outputs"]["hic15"]["factors"]
     assert {row["value"] for row in factors.values()} == {0.0}
@@ -249,7 +187,7 @@ def test_morris_says_a_constant_and_draws_the_others(tmp_path: Path, drawn: Figu
 
 @pytest.mark.parametrize("kind", ["sobol", "morris"])
 def test_a_study_of_a_constant_alone_is_reported(kind: str, tmp_path: Path, drawn: Figures) -> None:
-    text = study_text(kind, DESIGNS[kind], inputs=ONE_SPEED, outputs=("hic15",))
+    text = study_text(kind, inputs=ONE_SPEED, outputs=("hic15",))
     assert "HIC15 does not vary." in words_of(ran(text, tmp_path / "out"))
     assert drawn == {}
 
@@ -277,12 +215,11 @@ def test_sensitivity_to_an_input_that_is_not_finite_is_refused(
 
 
 def test_a_comparison_says_and_hatches_a_constant(tmp_path: Path, drawn: Figures) -> None:
-    report = '\n[report]\noutputs = ["hic15", "peak_force"]\n'
-    folder = ran(HOODS + INPUTS + report, tmp_path / "out")
+    folder = ran(study_text("model-comparison"), tmp_path / "out")
     text = words_of(folder)
-    assert "HIC15 does not vary, by whatever model." in text
+    assert "HIC15 does not vary in any model." in text
     assert "HIC15: soft and stiff give the same value in every run." in text
-    assert "HIC15: there is no rank correlation that an input could break." in text
+    assert "HIC15: there is no rank correlation to analyse." in text
     assert "does not vary" in cells_of(drawn["variance"])
     pair = folder.read_json("analysis.json")["outputs"]["hic15"]["pairs"]["soft/stiff"]
     assert pair["rank_correlation"]["value"] is pair["breaking"]["noise"] is None
@@ -290,43 +227,25 @@ def test_a_comparison_says_and_hatches_a_constant(tmp_path: Path, drawn: Figures
 
 
 def test_an_injury_study_of_a_constant_judges_no_limit(tmp_path: Path, drawn: Figures) -> None:
-    folder = ran(INJURY + INPUTS, tmp_path / "out")
-    text = words_of(folder)
-    assert text.count("the limit says nothing, as the runs cannot be told apart.") == 2
-    assert "What does not vary: HIC15." in text
-    assert "_slower [red] $x$ %" in legend_of(drawn["exceedance"])
+    text = words_of(ran(study_text("injury"), tmp_path / "out"))
+    assert text.count("the limit cannot be rated, as the runs do not differ.") == 2
+    assert "Constant: HIC15." in text
+    assert "slow <b> [red] $x$ %" in legend_of(drawn["exceedance"])
     assert "roc" not in drawn
 
 
 def test_a_risk_of_zero_has_no_half(tmp_path: Path) -> None:
-    def harmless(
-        argument: Mapping[str, Any], rows: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], list[str]]:
-        outputs, status = rounded(argument, rows)
-        return 0.0 * outputs, status
-
-    with (
-        mock.patch.object(evaluation, "evaluate", harmless),
-        mock.patch.object(injury, "draw", lambda *_: {}),
-    ):
-        folder = ran(INJURY + INPUTS, tmp_path / "out")
+    with by_formula(harmless), without_figures():
+        folder = ran(study_text("injury", "n = 120\nreplicate_size = 20"), tmp_path / "out")
     halved = folder.read_json("analysis.json")["speed"]["halved"]
     assert {entry["value"] for entry in halved.values()} == {None}
-    assert "All outcomes are AIS 0, so nothing goes with them." in words_of(folder)
+    assert "All outcomes are AIS 0, so there is no correlation." in words_of(folder)
 
 
 def test_an_injury_study_without_a_run_left_says_where(tmp_path: Path) -> None:
-    def failing(
-        argument: Mapping[str, Any], rows: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], list[str]]:
-        outputs, _ = rounded(argument, rows)
-        return outputs + np.nan, ["time_limit"] * len(rows)
-
-    with (
-        mock.patch.object(evaluation, "evaluate", failing),
-        pytest.raises(StudyError, match="scenario reference, front car: all runs failed"),
-    ):
-        ran(INJURY + INPUTS, tmp_path / "out")
+    said = "scenario reference, front car: all runs failed"
+    with by_formula(failing), pytest.raises(StudyError, match=said):
+        ran(study_text("injury", limit=1.0), tmp_path / "out")
 
 
 # -- values of any size and shape -------------------------------------------------------------
@@ -356,22 +275,19 @@ def test_numbers_of_any_size_are_ranked_as_others(
     np.testing.assert_allclose(found, grown * np.array(plain), rtol=1e-9)
 
 
-def test_a_value_of_one_run_alone_is_no_distribution(
-    sources: dict[str, ResultsFolder], tmp_path: Path
+@pytest.mark.parametrize(
+    ("held", "value", "said"),
+    [
+        (slice(0), 1.0, "HIC15: no run has a value."),
+        (slice(7, 8), 1.0, "HIC15: only one run has a value."),
+        (slice(12, None), 42.0, "it is 42.00 in all 108 runs that have a value."),
+    ],
+)
+def test_few_values_and_constants_with_holes_are_told(
+    sources: dict[str, ResultsFolder], tmp_path: Path, held: slice, value: float, said: str
 ) -> None:
-    runs = sources["monte-carlo"].runs()
-    values = np.where(runs["run"] == 7, 1.0, np.nan)
-    lone = copy_of(sources["monte-carlo"], tmp_path / "out", runs.assign(hic15=values))
-    api.build_report(lone)
-    assert "HIC15: only one run has a value." in words_of(lone)
-
-
-def test_a_constant_with_holes_counts_the_runs_that_have_it(
-    sources: dict[str, ResultsFolder], tmp_path: Path
-) -> None:
-    source = sources["monte-carlo"]
-    runs = source.runs()
-    part = copy_of(source, tmp_path / "out",
-                   runs.assign(hic15=np.where(runs["run"] < 12, np.nan, 42.0)))  # fmt: skip
-    api.build_report(part)
-    assert "it is 42.00 in all 108 runs that have a value." in words_of(part)
+    runs = sources["monte-carlo"].runs().assign(hic15=np.nan)
+    runs.loc[runs.index[held], "hic15"] = value
+    folder = copy_of(sources["monte-carlo"], tmp_path / "out", runs)
+    api.build_report(folder)
+    assert said in words_of(folder)

@@ -1,6 +1,5 @@
 """The comparison of models: headforms on two hoods, whose difference is known, and two crashes."""
 
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -11,14 +10,12 @@ import pytest
 from headform_studies import INPUTS, without_figures
 
 from mcstudy.errors import StudyError, UserError
-from mcstudy.execution.results import ResultsFolder, digest
+from mcstudy.execution.results import ResultsFolder
 from models.registry import load_model
-from studies import api, cli
-from studies import listing as catalogue
-from studies.api import build_report
+from studies import api
 from studies.kinds import load_study, parse_study
 from studies.model_comparison.schema import ModelComparison
-from studies.model_comparison.study import NOMINAL
+from studies.model_comparison.study import NOMINAL, Comparison
 
 FACTOR = 2.0**0.75
 """HIC15 of a straight hood goes with the stiffness to the power of 0.75."""
@@ -78,7 +75,8 @@ def write(folder: Path, text: str) -> Path:
 @pytest.fixture(scope="module")
 def hoods(tmp_path_factory: pytest.TempPathFactory) -> ResultsFolder:
     base = tmp_path_factory.mktemp("hoods")
-    return api.run_study(write(base, text_of()), out=base / "out", workers=1)
+    with without_figures():
+        return api.run_study(write(base, text_of()), out=base / "out", workers=1)
 
 
 def cell(folder: ResultsFolder, label: str) -> ResultsFolder:
@@ -132,30 +130,6 @@ def test_published_methods_stand_beside_ours(hoods: ResultsFolder) -> None:
     assert "<b>hoods</b>" not in report
 
 
-def test_the_report_is_built_again_without_a_model(hoods: ResultsFolder) -> None:
-    before = hoods.read_json("analysis.json")
-    assert build_report(hoods) == before
-
-
-def test_figures_and_manifest_are_there(hoods: ResultsFolder) -> None:
-    names = {path.stem for path in (hoods.path / "figures").glob("*.png")}
-    assert names == {"variance", "pairs_soft_stiff", "breaking_soft_stiff", "along_soft_stiff"}
-    manifest = hoods.read_json("manifest.json")
-    assert manifest["finished"] and manifest["design"]["cells"] == ["soft", "stiff"]
-    for label in ("soft", "stiff"):
-        assert manifest["digests"][label] == digest(cell(hoods, label).runs())
-    assert hoods.progress() == (400, {"ok": 400})
-
-
-def test_a_larger_comparison_keeps_what_it_has(tmp_path: Path) -> None:
-    with without_figures():
-        out = tmp_path / "out"
-        small = api.run_study(write(tmp_path, text_of(n=120)), out=out, workers=1)
-        first = cell(small, "soft").runs()
-        larger = api.run_study(write(tmp_path, text_of(n=200)), out=out, workers=1)
-    pd.testing.assert_frame_equal(cell(larger, "soft").runs().iloc[:120], first)
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -198,43 +172,11 @@ def test_one_model_is_no_comparison() -> None:
         parse_study(text[:start] + text[end:])
 
 
-def test_another_model_does_not_mix_with_what_is_there(
-    hoods: ResultsFolder, tmp_path: Path
-) -> None:
-    with pytest.raises(UserError, match=r"models.soft: .*holds another study"):
-        api.run_study(write(tmp_path, text_of(soft=9000.0)), out=hoods.path, workers=1)
-
-
-def test_the_list_of_inputs_says_what_is_ignored() -> None:
-    for name, marked in (("planar", 2), ("multibody", 0)):
-        rows = catalogue.describe(name)["inputs"]
-        assert sum(bool(row.get("ignored")) for row in rows) == marked
-
-
 def test_too_many_failures_name_the_model(tmp_path: Path) -> None:
     # A hood of 1 N/mm: the contact lasts more than a second and every run fails.
     text = text_of(n=40, soft=0.1)
-    with pytest.raises(StudyError, match="soft: 100"):
+    with pytest.raises(StudyError, match="soft: 100"), without_figures():
         api.run_study(write(tmp_path, text), out=tmp_path / "out", workers=1)
-
-
-def test_the_command_prints_one_object(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = write(tmp_path, text_of(n=120))
-    out = str(tmp_path / "out")
-    monkeypatch.setattr("sys.argv", ["mcstudy", "run", str(path), "--out", out, "--json",
-                                     "--workers", "1"])  # fmt: skip
-    with without_figures(), pytest.raises(SystemExit) as end:
-        cli.main()
-    assert end.value.code == 0
-    printed = json.loads(capsys.readouterr().out)
-    assert printed["analysis"]["compared"] == ["hic15", "peak_force"]
-    monkeypatch.setattr("sys.argv", ["mcstudy", "report", out])
-    with without_figures(), pytest.raises(SystemExit) as end:
-        cli.main()
-    assert end.value.code == 0
-    assert "rank" in capsys.readouterr().out
 
 
 CRASHES = """\
@@ -269,21 +211,24 @@ unit = "m"
 
 def test_two_crash_models_are_compared_and_drawn_with_any_workers(tmp_path: Path) -> None:
     path = write(tmp_path, CRASHES)
-    folder = api.run_study(path, out=tmp_path / "one", workers=1)
-    with without_figures():
-        again = api.run_study(path, out=tmp_path / "two", workers=2)
-    assert (
-        folder.read_json("manifest.json")["digests"] == again.read_json("manifest.json")["digests"]
-    )
+    found = []
+    for workers in (1, 2):
+        with without_figures():
+            folder = api.run_study(path, out=tmp_path / str(workers), workers=workers)
+        found.append(folder.read_json("manifest.json")["digests"])
+    assert found[0] == found[1]
     analysis = folder.read_json("analysis.json")
     assert analysis["compared"] == ["hic15", "throw_distance", "wad"]
     assert list(analysis["models"]["planar"]["ignored"]) == ["lateral_offset"]
-    names = {file.stem for file in (folder.path / "figures").glob("*.png")}
-    assert {"kinematics_spatial", "kinematics_planar"} <= names
+    study = load_study(path)
+    assert isinstance(study, ModelComparison)
+    comparison = Comparison()
+    figures = comparison.draw(study, comparison.results(study, folder), analysis)
+    assert {"kinematics_spatial", "kinematics_planar"} <= set(figures)
     assert cell(folder, "planar").read_json(NOMINAL)["scene"]["names"][0] == "hip"
     # A planar study of one model goes on where it stopped, with the same bits.
     runs = cell(folder, "planar").runs()
     cell(folder, "planar").compact(runs.iloc[:13])
     with without_figures():
-        resumed = api.run_study(path, out=folder.path, workers=2)
+        resumed = api.run_study(path, out=folder.path, workers=1)
     pd.testing.assert_frame_equal(cell(resumed, "planar").runs(), runs)

@@ -1,76 +1,112 @@
 """The reconstruction of the reference case."""
 
-import json
+import contextlib
+import io
 from pathlib import Path
 
 import pytest
+from headform_studies import Answer, assert_stands_alone, mcstudy, told
 
 from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.measurement.isomme import read_test
+from mcstudy.text import number
 from models.criteria import head_injury_criterion
-from studies.kinds import load_study, parse_study
+from models.registry import load_model
+from studies.kinds import parse_study
+from studies.published_tables import as_table, compare_with_table
 from studies.reconstruction.schema import Reconstruction
-from studies.reconstruction.study import reconstruct, write_reconstruction
+from studies.reconstruction.study import reconstruct
+from studies.terminal import print_table
 
 CASE = Path("configs/paper_case.toml")
 
 
+def case_of(text: str) -> Reconstruction:
+    study = parse_study(text)
+    assert isinstance(study, Reconstruction)
+    return study
+
+
 @pytest.fixture(scope="module")
-def study() -> Reconstruction:
-    loaded = load_study(CASE)
-    assert isinstance(loaded, Reconstruction)
-    return loaded
+def case(tmp_path_factory: pytest.TempPathFactory) -> tuple[Answer, ResultsFolder]:
+    out = tmp_path_factory.mktemp("case") / "out"
+    return mcstudy("reconstruct", CASE, "--out", out), ResultsFolder(out)
 
 
-def test_prints_our_row_beside_the_published_ones(study: Reconstruction) -> None:
-    run, tables = reconstruct(study)
-    first, second, _ = tables
-    assert [label for label, _ in first.rows][-1] == "this run"
-    assert first.rows[-1][1][0] == pytest.approx(run.outputs["throw_distance"])
-    assert dict(first.rows)["MBS model"][:2] == [13.5, 1.32]
-    assert dict(second.rows)["facet model"][1] == 1865.0
-    # Units of the printed table: the angle is in degrees there.
-    assert tables[2].head[2] == "head impact angle [deg]"
-    assert 40.0 < (tables[2].rows[-1][1][2] or 0.0) < 95.0
+def test_prints_our_column_beside_the_published_ones(case: tuple[Answer, ResultsFolder]) -> None:
+    answer, folder = case
+    assert (answer.code, answer.err) == (0, "")
+    outputs = folder.read_json("analysis.json")["outputs"]
+    lines = [[cell.strip() for cell in line.split("│")] for line in answer.out.splitlines()]
+    first = next(line for line in lines if "throw distance [m]" in line)
+    assert first[2] == "13.50"
+    assert number(outputs["throw_distance"], 4) == first[-2]
+    for word in ("MBS model", "facet model", "this run", "head impact angle [deg]", "ended: "):
+        assert word in answer.out
+    assert str(folder.path / "report.html") in answer.line
 
 
-def test_writes_the_whole_folder(study: Reconstruction, tmp_path: Path) -> None:
-    folder = ResultsFolder(tmp_path / "case")
-    run, tables = reconstruct(study)
-    write_reconstruction(study, CASE.read_text(), run, tables, folder)
+def test_no_value_or_heading_breaks_over_lines_in_80_columns(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setenv("TERM", "dumb")
+    si = {item.name: item.unit for item in load_model("multibody").outputs}
+    ours = {"this run": dict.fromkeys(si, -1234.5678)}
+    for published in case_of(CASE.read_text()).tables:
+        table = as_table(compare_with_table(published, ours, si))
+        with contextlib.redirect_stdout(Terminal()) as shown:
+            print_table(table.caption, table.head, table.rows)
+        lines = shown.getvalue().splitlines()
+        assert max(map(len, lines)) <= 80
+        for cell in [*table.head, *(cell for row in table.rows for cell in row[1:])]:
+            assert any(cell in line for line in lines), cell
+
+
+def test_writes_the_whole_folder(case: tuple[Answer, ResultsFolder]) -> None:
+    folder = case[1]
+    outputs = folder.read_json("analysis.json")["outputs"]
     figures = {path.name for path in (folder.path / "figures").iterdir()}
     assert {"kinematics.png", "head_velocity.svg", "head_acceleration.png", "crash.gif"} <= figures
     assert (folder.path / "figures" / "crash.gif").read_bytes()[:6] == b"GIF89a"
     html = (folder.path / "report.html").read_text()
     assert "MBS model" in html
-    assert 'src="http' not in html
-    analysis = json.loads((folder.path / "analysis.json").read_text())
-    assert analysis["outputs"]["hic15"] == pytest.approx(run.outputs["hic15"])
+    assert_stands_alone(html)
     assert folder.history(0)["head"].shape[0] > 1000
     # Each impact is a test of its own, whose HIC15 is that of the table; samples have seven digits.
     for name, output in (("paper_case", "hic15"), ("paper_case_road", "ground_hic15")):
         test = read_test(folder.path / "iso_mme" / name / f"{name}.mme")
         head = next(channel for channel in test.channels if channel.code.endswith("ACRA"))
         found = head_injury_criterion(head.time, head.values, 0.015)[0]
-        assert found == pytest.approx(run.outputs[output], rel=1e-5)
+        assert found == pytest.approx(outputs[output], rel=1e-5)
         assert "a test of its own" in test.header["comments"]
-        assert head.time[0 if "road" in name else -1] == pytest.approx(
-            run.outputs["ground_time"], abs=2e-4
-        )
+        end = head.time[0 if "road" in name else -1]
+        assert end == pytest.approx(outputs["ground_time"], abs=2e-4)
 
 
-def test_a_table_without_units_for_a_value_is_refused() -> None:
-    text = CASE.read_text().replace("values = { throw_distance = 13.6, wad = 1.33 }",
-                                    "values = { clip_3ms = 13.6 }")  # fmt: skip
-    study = parse_study(text)
-    assert isinstance(study, Reconstruction)
-    with pytest.raises(UserError, match=r"tables\[0\]\.rows\[1\]\.values\.clip_3ms"):
-        reconstruct(study)
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (("values = { throw_distance = 13.6, wad = 1.33 }", "values = { clip_3ms = 13.6 }"),
+         r"tables\[0\]\.rows\[1\]\.values\.clip_3ms"),
+        (('wad = "m"', 'wad = "kg"'), "unit 'm' measures length"),
+    ],
+)  # fmt: skip
+def test_a_table_without_units_for_a_value_or_with_wrong_ones_is_refused(
+    edit: tuple[str, str], message: str
+) -> None:
+    text = CASE.read_text()
+    assert edit[0] in text
+    with pytest.raises(UserError, match=message):
+        reconstruct(case_of(text.replace(*edit)))
 
 
-def test_a_table_with_a_wrong_unit_is_refused() -> None:
-    study = parse_study(CASE.read_text().replace('wad = "m"', 'wad = "kg"'))
-    assert isinstance(study, Reconstruction)
-    with pytest.raises(UserError, match="unit 'm' measures length"):
-        reconstruct(study)
+def test_a_reconstruction_is_no_study_of_runs(case: tuple[Answer, ResultsFolder]) -> None:
+    said = told(mcstudy("sensitivity", case[1].path))
+    assert "is the folder of a study of kind reconstruction" in said
+    assert "drawn again by 'mcstudy reconstruct'" in told(mcstudy("report", case[1].path))

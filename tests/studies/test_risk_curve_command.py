@@ -35,7 +35,7 @@ MEDIAN, SPREAD = 800.0, 0.4
 def undrawn() -> Iterator[None]:
     """Leave the figure out, and the fits without each case."""
     with (
-        mock.patch.object(describing, "MOST_REFITTED", 60),
+        mock.patch.object(describing, "MAX_REFITTED", 60),
         mock.patch.object(risk, "draw_risk_curve", lambda *_: Figure()),
         mock.patch.object(style, "save", lambda *_: None),
         mock.patch.object(document, "png_bytes", lambda *_: b""),

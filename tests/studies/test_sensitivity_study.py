@@ -13,6 +13,7 @@ from headform_studies import (
     FAILING,
     INPUTS,
     SPREADS,
+    assert_stands_alone,
     by_formula,
     contents,
     copy_of,
@@ -22,6 +23,7 @@ from headform_studies import (
     run_text,
     shares,
     study_text,
+    told,
     unfinished,
     without_figures,
 )
@@ -76,10 +78,10 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> ResultsFolder:
 
 @pytest.fixture(scope="module")
 def saltelli(tmp_path_factory: pytest.TempPathFactory) -> ResultsFolder:
-    """Return the folder of a Sobol' study of 128 base points."""
+    """Return the folder of a Sobol' study of 64 base points, with second order."""
     results = ResultsFolder(tmp_path_factory.mktemp("sources") / "saltelli")
     with without_figures():
-        run_text(study_text("sobol", "n = 128"), results)
+        run_text(study_text("sobol", "n = 64\nsecond_order = true"), results)
     return results
 
 
@@ -95,7 +97,7 @@ def drawn(
 # -- the numbers ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("method", list(DESIGNS))
+@pytest.mark.parametrize("method", DESIGNS)
 def test_first_order_indices_are_those_of_the_closed_form(
     tmp_path: Path, undrawn: None, method: str
 ) -> None:
@@ -132,7 +134,7 @@ def test_of_a_sobol_study_only_independent_runs_are_used(
 ) -> None:
     analysis = measure_sensitivity(saltelli, ResultsFolder(tmp_path / "out"), quiet=True)
     assert analysis["kind"] == "sobol"
-    assert analysis["runs"] == 256
+    assert (analysis["runs"], len(saltelli.runs())) == (128, 640)
     truth = first_order(shares("hic15"))
     table = analysis["outputs"]["hic15"]["measures"]["first_order"]["inputs"]
     for name in SPREADS:
@@ -141,14 +143,6 @@ def test_of_a_sobol_study_only_independent_runs_are_used(
     own = saltelli.read_json("analysis.json")["outputs"]["hic15"]["first"]
     for name in SPREADS:
         assert table[name]["value"] == pytest.approx(own[name]["value"], abs=0.15)
-
-
-def test_of_second_order_designs_as_well(tmp_path: Path, undrawn: None) -> None:
-    results = ResultsFolder(tmp_path / "second")
-    run_text(study_text("sobol", "n = 64\nsecond_order = true"), results)
-    analysis = measure_sensitivity(results, quiet=True)
-    assert analysis["runs"] == 128
-    assert len(results.runs()) == 640
 
 
 def test_the_numbers_are_a_function_of_the_folder(
@@ -253,57 +247,21 @@ def test_dependence_within_a_group_of_a_sobol_study_is_named(tmp_path: Path, und
     assert list(analysis["outputs"]["hic15"]["measures"]["delta"]["inputs"]) == list(SPREADS)
 
 
-def test_independent_inputs_are_not_said_to_depend(
-    drawn: tuple[ResultsFolder, dict[str, Any]],
-) -> None:
-    assert "depend on each other" not in (drawn[0].path / "report.html").read_text()
-
-
 # -- what is refused --------------------------------------------------------------------------
 
 
-def test_a_morris_folder_is_refused(tmp_path: Path, undrawn: None) -> None:
-    results = ResultsFolder(tmp_path / "morris")
-    run_text(study_text("morris", "n = 40"), results)
-    answer = mcstudy("sensitivity", results.path)
-    assert answer.code == 2
-    assert "Morris" in answer.err
-    assert len(answer.err.strip().splitlines()) == 1
-    assert not (results.path / "sensitivity").exists()
-
-
-def test_a_reconstruction_folder_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "study.toml").write_text(Path("configs/paper_case.toml").read_text())
-    answer = mcstudy("sensitivity", tmp_path)
-    assert answer.code == 2
-    assert "is the folder of a study of kind reconstruction" in answer.err
-    assert not (tmp_path / "sensitivity").exists()
-
-
 def test_an_unknown_output_is_refused(source: ResultsFolder) -> None:
-    answer = mcstudy("sensitivity", source.path, "--output", "hic15", "--output", "hic16")
-    assert answer.code == 2
-    assert "--output: model 'headform' has no output 'hic16'" in answer.err
-    assert "hic36" in answer.err
+    said = told(mcstudy("sensitivity", source.path, "--output", "hic15", "--output", "hic16"))
+    assert "--output: model 'headform' has no output 'hic16'" in said
+    assert "hic36" in said
     assert not (source.path / "sensitivity").exists()
 
 
 def test_too_few_runs_are_refused(source: ResultsFolder, tmp_path: Path) -> None:
     few = copy_of(source, tmp_path / "few", source.runs().iloc[:99])
-    answer = mcstudy("sensitivity", few.path)
-    assert answer.code == 2
-    assert "hic15: 99 runs have a value, 100 are needed" in answer.err
+    said = told(mcstudy("sensitivity", few.path))
+    assert "hic15: 99 runs have a value, 100 are needed" in said
     assert not (few.path / "sensitivity").exists()
-
-
-def test_a_folder_without_study_or_runs_is_refused(source: ResultsFolder, tmp_path: Path) -> None:
-    assert mcstudy("sensitivity", tmp_path / "none").code == 2
-    empty = ResultsFolder(tmp_path / "empty")
-    with empty.open_for_writing():
-        empty.write_text("study.toml", (source.path / "study.toml").read_text())
-    answer = mcstudy("sensitivity", empty.path)
-    assert answer.code == 2
-    assert "holds no runs" in answer.err
 
 
 def test_the_source_folder_itself_is_no_place_for_the_report(
@@ -357,13 +315,11 @@ def test_out_json_and_quiet(source: ResultsFolder, tmp_path: Path, undrawn: None
 def test_report_is_self_contained_and_drawn(drawn: tuple[ResultsFolder, dict[str, Any]]) -> None:
     folder = drawn[0].path
     html = (folder / "report.html").read_text()
-    assert "<script" not in html
-    assert "Headform &amp; &lt;script&gt;" in html
-    assert all(link.startswith("data:image/") for link in re.findall(r'src="([^"]*)"', html))
-    assert all(link.startswith("#") for link in re.findall(r'href="([^"]*)"', html))
+    assert_stands_alone(html)
+    assert "depend on each other" not in html
     assert "256 runs of the monte-carlo study headform_monte-carlo" in html
     assert "noise line" in html
-    assert "None of them sees an input that acts through interactions alone" in html
+    assert "None of them detects an input that acts through interactions alone" in html
     files = {file.name for file in (folder / "figures").iterdir()}
     assert files == {
         f"{kind}_{output}.{ending}"
@@ -374,18 +330,6 @@ def test_report_is_self_contained_and_drawn(drawn: tuple[ResultsFolder, dict[str
     row = re.search(r"<tr><td[^>]*>friction body–car</td>(.*?)</tr>", html)
     assert row is not None
     assert len(re.findall(r"<td", row.group(1))) == len(MEASURES)
-
-
-@pytest.mark.parametrize("value", [700.0, 700.1])
-def test_a_constant_output_is_said_not_to_vary(
-    source: ResultsFolder, tmp_path: Path, value: float
-) -> None:
-    flat = copy_of(source, tmp_path / "flat", source.runs().assign(hic15=value))
-    answer = mcstudy("sensitivity", flat.path, "--output", "hic15", "--json")
-    assert answer.code == 0, answer.err
-    table = json.loads(answer.out)["analysis"]["outputs"]["hic15"]["measures"]["first_order"]
-    assert {row["value"] for row in table["inputs"].values()} == {None}
-    assert "HIC15 does not vary." in (flat.path / "sensitivity" / "report.html").read_text()
 
 
 def test_an_output_that_hardly_any_run_has_does_not_hide_the_others(
@@ -432,12 +376,12 @@ def test_a_sentence_names_shares_shape_and_none() -> None:
         ),
     )
     assert "impact speed 50 ± 3 %, gait phase 20 ± 3 %" in text
-    assert "Its distribution moves with yaw rate, dive angle as well" in text
-    assert text.endswith("Not distinguishable from none: age.")
+    assert "Its distribution also depends on yaw rate, dive angle" in text
+    assert text.endswith("Not distinguishable from zero: age.")
 
 
 def test_a_sentence_without_a_clear_input() -> None:
     text = sensitivity_report.sentence("wad", made_up(age=(-0.01, False, False, False)))
-    assert text.startswith("No single input stands out in the mean of wrap-around distance")
-    assert text.endswith("Not distinguishable from none: age.")
+    assert text.startswith("No input has a clear first-order effect on wrap-around distance")
+    assert text.endswith("Not distinguishable from zero: age.")
     assert "-" not in text.replace("wrap-around", "")

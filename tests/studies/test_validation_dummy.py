@@ -1,13 +1,12 @@
 """The validation's part on measured head impacts of a child dummy, with and without the data."""
 
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from headform_studies import Answer, mcstudy, told
 
-from studies import cli
 from studies.validation import dummy_head
 from studies.validation.check import Part
 
@@ -60,52 +59,25 @@ BROKEN = {
 }
 
 
-def run(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, folder: Path
-) -> tuple[int, str]:
-    """Return exit code and errors of ``mcstudy validate --only dummy-head``."""
-    arguments = ["mcstudy", "validate", "--only", "dummy-head", "--quiet"]
-    paths = ["--measured", str(folder), "--out", str(folder / "out")]
-    monkeypatch.setattr(sys, "argv", arguments + paths)
-    with pytest.raises(SystemExit) as ended:
-        cli.main()
-    assert isinstance(ended.value.code, int)
-    return ended.value.code, capsys.readouterr().err.strip()
+def run(folder: Path) -> Answer:
+    """Return what ``mcstudy validate --only dummy-head`` says."""
+    paths = ("--measured", folder, "--out", folder / "out")
+    return mcstudy("validate", "--only", "dummy-head", "--quiet", *paths)
 
 
-@pytest.mark.parametrize("damage", BROKEN)
-def test_a_broken_file_is_a_user_error(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    damage: str,
-) -> None:
-    (tmp_path / dummy_head.FILE).write_text("\n".join(BROKEN[damage]))
-    code, errors = run(capsys, monkeypatch, tmp_path)
-    assert code == 2
-    assert dummy_head.FILE in errors
-    assert "\n" not in errors
-
-
-def test_a_file_that_is_no_text_is_a_user_error(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / dummy_head.FILE).write_bytes(bytes(range(256)) * 8)
-    code, errors = run(capsys, monkeypatch, tmp_path)
-    assert code == 2
-    assert "cannot be read" in errors
-    assert "\n" not in errors
+@pytest.mark.parametrize("damage", [*BROKEN, "no text"])
+def test_a_broken_file_is_a_user_error(tmp_path: Path, damage: str) -> None:
+    content = "\n".join(BROKEN.get(damage, [])).encode() or bytes(range(256)) * 8
+    (tmp_path / dummy_head.FILE).write_bytes(b"" if damage == "empty" else content)
+    said = told(run(tmp_path))
+    assert dummy_head.FILE in said
+    assert ("cannot be read" in said) or damage != "no text"
 
 
 @pytest.mark.parametrize("folder", ["", "nowhere"])
-def test_without_the_file_nothing_is_run_and_nothing_fails(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    folder: str,
-) -> None:
-    code, errors = run(capsys, monkeypatch, tmp_path / folder)
-    assert (code, errors) == (0, "")
+def test_without_the_file_nothing_is_run_and_nothing_fails(tmp_path: Path, folder: str) -> None:
+    said = run(tmp_path / folder)
+    assert (said.code, said.err) == (0, "")
     part = dummy_head.validate(1, tmp_path / folder)
     assert {c.verdict for c in part.checks} == {"not run"}
     assert dummy_head.FILE in part.paragraphs[0]

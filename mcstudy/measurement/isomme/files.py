@@ -4,8 +4,8 @@
 and so on hold one channel each: a header of ``name :value`` lines, split at the first colon, then
 one sample a line. ``NOVALUE`` stands for a missing value.
 
-Headers are read of every channel, samples only of those that are wanted: a channel that nobody
-needs may hold a single value, no times or no code.
+Headers are read of every channel, samples only of the selected ones: other channels may hold a
+single value, no times or no code.
 """
 
 import re
@@ -29,17 +29,17 @@ FILTERS = {"A": "CFC1000", "B": "CFC600", "C": "CFC180", "D": "CFC60"}
 RAW = "0"
 """Last character of the code of a channel that is not filtered."""
 SOUND = ("", "ok", "scaling factor applied", "linearised data", "linearized data")
-"""Values of 'Data status' with which a channel may be used; beside them the format has channel and
-system failed, meaningless, questionable and no data."""
+"""Values of 'Data status' of usable channels; the format also has channel failed, system failed,
+meaningless, questionable and no data."""
 TIME = "TI"
 """Physical dimension, characters 13 and 14, of a channel of times."""
 UNEQUAL = 1e-3
-"""Share of a sampling interval by which times may differ from it in the last sample (assumed)."""
+"""Tolerated difference of times in the last sample, in intervals a sample (assumed)."""
 
 
 @dataclass(frozen=True)
 class Channel:
-    """A channel: code, unit, times (s), values (NaN where missing), filter, what to know of it."""
+    """A channel: code, unit, times (s), values (NaN where missing), filter, notes."""
 
     code: str
     unit: str
@@ -51,12 +51,15 @@ class Channel:
 
 @dataclass(frozen=True)
 class ChannelFile:
-    """A channel as it stands in its file: header by lower-case name, code, lines.
+    """A channel file: header, code, lines.
 
     Attributes
     ----------
-    path : Path. code : in capital letters, not always of 16 characters. header : by name.
-    lines : of the file. first : number of the first line that is a sample, from 0.
+    path : of the file.
+    code : in capital letters, not always of 16 characters.
+    header : values by lower-case name.
+    lines : of the file.
+    first : number of the first line that is a sample, from 0.
     """
 
     path: Path
@@ -90,7 +93,7 @@ class ChannelFile:
     def filter(self) -> str:
         """Filter of the signal, ``none`` if it is raw or unknown.
 
-        The header's channel frequency class counts where the code does not tell.
+        The header's channel frequency class is used where the code does not state the filter.
         """
         letter = self.code[15:16]
         if letter in FILTERS or letter == RAW:
@@ -107,7 +110,7 @@ class ChannelFile:
 
 @dataclass(frozen=True)
 class Test:
-    """A test: name, title, header by lower-case name, channels as they stand in their files."""
+    """A test: name, title, header by lower-case name, channel files."""
 
     path: Path
     title: str
@@ -172,7 +175,7 @@ class Test:
         return Channel(file.code, units.canonical(unit), time, values, file.filter, tuple(notes))
 
     def _times(self, file: ChannelFile, count: int) -> tuple[Array, list[str]]:
-        """Return the times (count,) of a channel's samples, in s, and what to know of them."""
+        """Return the times (count,) of a channel's samples, in s, and notes on them."""
         interval = _number(file.path, file.header, "s", "sampling interval")
         start = _number(file.path, file.header, "s", "time of first sample")
         nominal: Array | None = None
@@ -212,7 +215,7 @@ class Test:
         return time, notes
 
     def _differs(self, file: ChannelFile, time: Array) -> bool:
-        """Return whether a channel of times holds other ones; what is no time says nothing."""
+        """Return whether a channel of times holds other times; False if it is unusable."""
         try:
             return not _is_close(self._reference(file, time.size), time)
         except UserError:
@@ -282,7 +285,7 @@ def _channel_file(path: Path, listed: Mapping[str, str]) -> ChannelFile:
     header = _header(lines[:first])
     code = _given(header, "channel code")
     if not code:
-        # The index of channels has it as well: 'Name of channel 001 :CODE / description'.
+        # The index of channels also has it: 'Name of channel 001 :CODE / description'.
         name = _given(listed, f"name of channel {path.suffix[1:]}")
         code = name.partition("/")[0].strip()
     return ChannelFile(path, code.upper(), header, lines, len(lines) if first is None else first)
@@ -321,7 +324,7 @@ def _number(path: Path, header: Mapping[str, str], unit: str, *names: str) -> fl
 
 
 def _samples(file: ChannelFile) -> Array:
-    """Return the samples of a channel, NaN where missing, infinite where it says so."""
+    """Return the samples of a channel, NaN where missing, infinite where so written."""
     kept = [(k, line.strip()) for k, line in enumerate(file.lines) if k >= file.first]
     kept = [(k, text) for k, text in kept if text]
     values = np.full(len(kept), np.nan)
@@ -341,13 +344,13 @@ def _samples(file: ChannelFile) -> Array:
 
 
 def _is_named(file: ChannelFile, name: str) -> bool:
-    """Return whether a channel is meant by the name of a reference channel."""
+    """Return whether the name of a reference channel refers to this channel."""
     names = (file.code, file.path.name, file.path.suffix[1:],
              _given(file.header, "name of the channel"))  # fmt: skip
     return name.strip().lower() in {known.lower() for known in names if known}
 
 
 def _is_close(one: Array, other: Array) -> bool:
-    """Return whether two columns of times are the same but for rounding."""
+    """Return whether two columns of times are equal within rounding."""
     interval = float(other[1] - other[0])
     return bool(np.max(np.abs(one - other)) <= UNEQUAL * interval * other.size)

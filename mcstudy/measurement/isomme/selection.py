@@ -1,8 +1,8 @@
-"""Which channels of a test are its head acceleration.
+"""Selection of the head acceleration among the channels of a test.
 
 One rule: the three axes, or the resultant, of one test object and one fine location, with a sound
-data status; what was measured before what was computed of it, the least filtered twin before the
-others. Where more than one head or sensor is left, the choice is the user's.
+data status; measured before computed channels, the least filtered copy before the others. Where
+more than one head or sensor remains, the user chooses.
 """
 
 import re
@@ -24,7 +24,7 @@ _RANKS = (RAW, "P", *FILTERS)
 
 @dataclass(frozen=True)
 class HeadSignal:
-    """The head acceleration of a test: resultant (g), its test object, what to know of it."""
+    """The head acceleration of a test: resultant (g), its test object, notes."""
 
     channel: Channel
     object: int
@@ -39,14 +39,14 @@ class _Candidate:
 
     @property
     def rank(self) -> tuple[int, bool]:
-        """How much was done to it: filter, and whether it is a resultant."""
+        """Degree of processing: filter, and whether it is a resultant."""
         letter = self.files[0].code[15]
         known = _RANKS.index(letter) if letter in _RANKS else len(_RANKS)
         return known, len(self.files) == 1
 
     @property
     def derived(self) -> int:
-        """How far it is from a measurement: 1 by its data source, 2 for a level held for 3 ms."""
+        """Degree of derivation: 1 if computed by its data source, 2 for a 3 ms level."""
         if all(re.fullmatch("3[A-Z]", file.code[8:10]) for file in self.files):
             return 2
         return int(all(re.search("calc|comput|deriv", file.source) for file in self.files))
@@ -62,15 +62,16 @@ def head_acceleration(test: Test, wanted: Sequence[str] = ()) -> HeadSignal:
 
     Parameters
     ----------
-    test : Test.
-    wanted : codes of the channels to take, or names of their files; ``?`` stands for any character,
+    test : Test
+    wanted : sequence of str
+        Codes of the channels to take, or names of their files; ``?`` stands for any character,
         ``*`` for any number of them. Such channels are taken whatever their data status.
 
     Raises
     ------
     UserError
-        If no head acceleration or more than one is left, or it cannot be used; the message lists
-        what there is.
+        If no head acceleration or more than one remains, or it cannot be used; the message lists
+        the channels.
     """
     heads = [f for f in test.files if _is_head(f)]
     if wanted:
@@ -134,7 +135,7 @@ def _matches(file: ChannelFile, wanted: Sequence[str]) -> bool:
 def _candidates(
     test: Test, files: Sequence[ChannelFile], failed: Sequence[ChannelFile]
 ) -> list[_Candidate]:
-    """Return the head accelerations of each sensor, the one that least was done to."""
+    """Return the least processed head accelerations of each sensor."""
     sensors: dict[tuple[str, str], list[ChannelFile]] = {}
     for file in files:
         sensors.setdefault((file.code[:2], file.code[6:12]), []).append(file)
@@ -151,7 +152,7 @@ def _candidates(
             axes = [by_axis[axis] for axis in AXES]
             if all(axes):
                 options += [_Candidate(c) for c in _products(axes)]
-            # The resultant of an axis that failed failed as well.
+            # The resultant of a failed axis is invalid as well.
             if by_axis[RESULTANT] and sensor not in broken:
                 options += [_Candidate((f,)) for f in by_axis[RESULTANT]]
         if not options and {f.code[14] for f in own} >= set(AXES):
@@ -164,9 +165,9 @@ def _candidates(
 
 
 def _products(axes: Sequence[Sequence[ChannelFile]]) -> list[tuple[ChannelFile, ...]]:
-    """Return the triples of three axes, of which each file is in one.
+    """Return the triples of three axes; each file is in one of them.
 
-    Axes that stand in the test twice belong together in the order of their files.
+    Axes that occur twice are paired in the order of their files.
     """
     count = max(len(files) for files in axes)
     return [tuple(files[min(k, len(files) - 1)] for files in axes) for k in range(count)]
@@ -186,7 +187,7 @@ def _combine(test: Test, parts: Sequence[Channel]) -> Channel:
     values = np.array([part.values for part in parts])
     kept = np.isfinite(values).all(axis=0)
     with np.errstate(over="ignore"):
-        # What becomes too large for a number is infinite.
+        # Overflow gives infinity.
         values = scale[:, None] * values
         # A resultant channel stays as it is: its noise before contact may be of either sign.
         found = values[0] if len(parts) == 1 else np.sqrt((values**2).sum(axis=0))
@@ -210,7 +211,7 @@ def _filter_words(channel: Channel) -> str:
 
 
 def _told(failed: Sequence[ChannelFile]) -> str:
-    """Return which channels have failed, and how to take them all the same."""
+    """Return the failed channels and the option to take them nevertheless."""
     if not failed:
         return ""
     names = ", ".join(f"{f.code} ({f.path.name}): {f.status!r}" for f in failed)

@@ -32,11 +32,22 @@ def write_test(
 
     Parameters
     ----------
-    folder : the test's folder, created.
-    name : of the test, letters and digits.
-    channels : values and unit by 16-character code.
-    start, interval : s, time of the first sample and between samples.
-    title, comment, velocity, mass : of the test; m/s and kg of test object 1.
+    folder : Path or str
+        The test's folder, created.
+    name : str
+        Of the test, letters and digits.
+    channels : mapping
+        Values and unit by 16-character code.
+    start : float
+        Time of the first sample, s.
+    interval : float
+        Sampling interval, s.
+    title, comment : str
+        Of the test.
+    velocity : float
+        m/s, of test object 1.
+    mass : float
+        kg, of test object 1.
 
     Raises
     ------

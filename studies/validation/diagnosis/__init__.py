@@ -1,1 +1,1 @@
-"""Validation of the diagnosis: effects are hidden in data and must be found."""
+"""Validation of the diagnosis: detection of effects hidden in data."""

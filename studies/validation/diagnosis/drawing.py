@@ -1,4 +1,4 @@
-"""What is hidden in a set of tests, drawn from a seed that the finder never sees."""
+"""Hidden effects of a set of tests, drawn from a seed unknown to the diagnosis."""
 
 from collections.abc import Callable
 
@@ -29,7 +29,7 @@ def _one(name: str, form: str, **ranges: tuple[float, float]) -> Draw:
     )
 
 
-# Sizes from what can hardly be seen to some ten times that.
+# Sizes from about the minimum detectable effect to some ten times that.
 CATALOGUE: dict[str, list[Draw]] = {
     "hood_bottoming": [
         _one("hood_bottoming", "catalogue", clearance=(0.028, 0.040), stiffness=(4e4, 4e5)),
@@ -73,7 +73,7 @@ KINDS = ("none", "catalogue", "other form", "outside", "pair")
 
 
 def draw(seed: int, kind: str) -> list[Hidden]:
-    """Return what is hidden in the set of a seed."""
+    """Return the hidden effects of the set of a seed."""
     rng = np.random.default_rng([seed, 77])
     if kind == "none":
         return []

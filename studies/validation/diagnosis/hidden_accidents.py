@@ -1,6 +1,6 @@
 """Accident collections with a hidden effect: the crash core with altered inputs.
 
-Nothing of the finder's catalogue is used: a wet road is a run with less friction for those who
+Nothing of the diagnosis's catalogue is used: a wet road is a run with less friction for those who
 slide beyond a place, a nose that dives more is another angle, a softer hood another factor.
 """
 
@@ -20,9 +20,9 @@ from studies.validation.diagnosis.hidden_effects import Hidden
 Array = NDArray[np.float64]
 
 RECORDED = {"impact_speed": ("m/s", 0.8), "stature": ("m", 0.0), "body_mass": ("kg", 0.0)}
-"""What is recorded of an accident: unit and standard uncertainty."""
+"""Recorded inputs of an accident: unit and standard uncertainty."""
 SCALARS = {"throw_distance": ("m", 0.5), "wad": ("m", 0.04), "hic15": ("1", 60.0)}
-"""What is measured: unit and standard uncertainty."""
+"""Measured scalars: unit and standard uncertainty."""
 
 
 def make_accidents(
@@ -32,8 +32,16 @@ def make_accidents(
 
     Parameters
     ----------
-    folder : to be made. study_file : Monte Carlo study whose inputs accidents are drawn from.
-    hidden : effects, by altered inputs. seed : of the draws. accidents : number.
+    folder : path
+        New folder.
+    study_file : path
+        Monte Carlo study that the inputs of the accidents are drawn from.
+    hidden : sequence of Hidden
+        Effects, by altered inputs.
+    seed : int
+        Seed of the draws.
+    accidents : int
+        Number of accidents.
     """
     rng = np.random.default_rng(seed)
     study = load_study(study_file)

@@ -1,7 +1,7 @@
 """Full-scale tests with a hidden effect: the crash core with altered inputs, seen by an instrument.
 
-Nothing of the finder's catalogue is used: what the accelerometer does wrong is done here to the
-signal, the rest are other inputs than the folder states.
+Nothing of the diagnosis's catalogue is used: errors of the accelerometer are applied to the signal,
+the other effects are inputs that differ from those that the folder states.
 """
 
 from collections.abc import Sequence
@@ -55,8 +55,14 @@ def make_crashes(folder: Path, hidden: Sequence[Hidden], seed: int, tests: int =
 
     Parameters
     ----------
-    folder : to be made. hidden : effects, by altered inputs or signals.
-    seed : of the draws. tests : number.
+    folder : path
+        New folder.
+    hidden : sequence of Hidden
+        Effects, by altered inputs or signals.
+    seed : int
+        Seed of the draws.
+    tests : int
+        Number of tests.
     """
     rng = np.random.default_rng(seed)
     model = load_model("multibody")

@@ -1,4 +1,4 @@
-"""Measured data with a hidden effect, by a generator that shares no code with what has to find it.
+"""Data with a hidden effect, by a generator that shares no code with the diagnosis.
 
 The headform's contact is integrated by SciPy's adaptive Runge-Kutta solver in two phases, into the
 hood and out of it, with contact laws written here. A set of tests has recorded speeds that are off,
@@ -40,11 +40,26 @@ class Laboratory:
 
     Attributes
     ----------
-    tests : number. slowest, fastest : m/s. mass : kg.
-    speed_sd : m/s, of the recorded speed. noise_sd : g, after the filter.
-    force_sd : N, of the load cell. rebound_sd : m/s, of the rebound speed.
-    scatter : relative, of the pulse from test to test. scale_sd : of the logarithm of the hood's
-        unknown force scale. force, rebound : whether a load cell and a rebound speed were recorded.
+    tests : int
+        Number of tests.
+    slowest, fastest : float
+        Impact speeds, m/s.
+    mass : float
+        Headform mass, kg.
+    speed_sd : float
+        Of the recorded speed, m/s.
+    noise_sd : float
+        Of the acceleration after the filter, g.
+    force_sd : float
+        Of the load cell, N.
+    rebound_sd : float
+        Of the rebound speed, m/s.
+    scatter : float
+        Of the pulse from test to test, relative.
+    scale_sd : float
+        Of the logarithm of the hood's unknown force scale.
+    force, rebound : bool
+        Whether a load cell and a rebound speed were recorded.
     """
 
     tests: int = 18
@@ -74,9 +89,16 @@ def make_tests(
 
     Parameters
     ----------
-    folder : to be made. hidden : effects. seed : of speeds, noise and scatter.
-    laboratory : how the tests were made. header_of : what ``measured.toml`` says of that, by
-        default the truth.
+    folder : path
+        New folder.
+    hidden : sequence of Hidden
+        Effects in the data.
+    seed : int
+        Seed of speeds, noise and scatter.
+    laboratory : Laboratory, optional
+        How the tests were made.
+    header_of : Laboratory, optional
+        What ``measured.toml`` states of it, by default the truth.
     """
     lab = laboratory or Laboratory()
     rng = np.random.default_rng(seed)

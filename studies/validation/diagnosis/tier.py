@@ -1,4 +1,4 @@
-"""The full tier: many trials, and the rates that they give."""
+"""The full tier: many trials and the resulting rates."""
 
 import itertools
 from collections import Counter
@@ -32,13 +32,13 @@ SETS = 300
 BATCH = 16
 """Trials that are run at a time."""
 LARGE = 2.0
-"""Size, over the smallest that is seen, from which an effect counts as large."""
+"""Size, over the minimum detectable one, from which an effect counts as large."""
 BINS = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, np.inf)
 
 
 @dataclass(frozen=True)
 class Target:
-    """A rate that is wanted: what, the trials that count, those that hit, bounds of the rate."""
+    """A required rate: name, eligible trials, hits, and bounds of the rate."""
 
     key: str
     what: str
@@ -96,7 +96,14 @@ def validate_diagnosis(
 
     Parameters
     ----------
-    folder : where it goes. sets : number of trials, about. workers : processes, -1 one a core.
+    folder : ResultsFolder
+        Folder of the report.
+    sets : int
+        Approximate number of trials.
+    workers : int
+        Processes, -1 for one per core.
+    quiet : bool
+        No progress line.
     """
     trials = plan(sets)
     # Sorted by seed, so that every kind is there from the start.
@@ -107,7 +114,7 @@ def validate_diagnosis(
     with folder.open_for_writing():
         return publish(
             folder, "Validation of the diagnosis",
-            f"{len(outcomes)} sets of 18 tests, effects hidden by another program",
+            f"{len(outcomes)} sets of 18 tests, effects hidden by an independent program",
             analyse(outcomes), _draw, _sections,
         )  # fmt: skip
 
@@ -142,7 +149,7 @@ def analyse(outcomes: Sequence[Outcome]) -> dict[str, Any]:
 
 
 def confusion(outcomes: Sequence[Outcome]) -> dict[str, dict[str, int]]:
-    """Return by what was hidden how often each name was given, single effects only."""
+    """Return the confusion matrix of hidden and named effects, single effects only."""
     table: dict[str, Counter[str]] = {}
     for o in outcomes:
         if len(o.names) > 1:
@@ -172,7 +179,7 @@ def _draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
     size = np.array([row["size"] for row in rows])
     share = [Curve(size, np.array([row["value"] for row in rows]), "detected", marker="o")]
     share += [Curve(np.full(2, row["size"]), np.array([row["low"], row["high"]])) for row in rows]
-    label = "size over the smallest seen with 80 % power [-]"
+    label = "size over the minimum detectable (80 % power) [-]"
     panel = Panel(label, "share detected [-]", share, xlim=(0.0, 10.0), ylim=(0.0, 1.02),
                   legend="lower right")  # fmt: skip
     return {"power": draw_panels([panel], width=6.0, height=4.0)}
@@ -192,7 +199,7 @@ def summarise(analysis: Mapping[str, Any]) -> list[Table]:
     ]
     return [
         Table("Rates with 95 % intervals.", ["what", "trials", "rate", "target", "verdict"], rates),
-        Table("What was hidden (rows) and what was named (columns).", ["hidden", *given], confused),
+        Table("Confusion matrix: hidden (rows) and named (columns).", ["hidden", *given], confused),
     ]
 
 
@@ -206,7 +213,7 @@ def _sections(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list[S
     words = [
         "Effects were hidden in sets of 18 headform tests by a generator with its own integrator "
         "and contact laws; noise 1 g, recorded speed within 0.05 m/s, 1 % scatter from test to "
-        "test. Effect, form and size were drawn from seeds that the finder does not see.",
+        "test. Effect, form and size were drawn from seeds unknown to the diagnosis.",
         f"A diagnosis took {number(analysis['seconds']['median'])} s on one core (median), "
         f"{number(analysis['seconds']['largest'])} s at most.",
     ]

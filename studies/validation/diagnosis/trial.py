@@ -1,7 +1,7 @@
-"""One trial: effects are hidden in a set of tests, the set is diagnosed, and the answer judged.
+"""One trial: hide effects in a set of tests, diagnose the set and assess the answer.
 
-The finder sees the folder of tests only. What was hidden is drawn from a seed that it never gets,
-and is compared with its answer after it has ended.
+The diagnosis reads the folder of tests only. The hidden effects are drawn from a seed that it never
+gets, and are compared with its answer afterwards.
 """
 
 import tempfile
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Trial:
-    """What is tried: seed, kind of set, whether load cell and rebound speed were recorded."""
+    """A trial: seed, kind of set, and whether load cell and rebound speed were recorded."""
 
     seed: int
     kind: str
@@ -40,14 +40,29 @@ class Trial:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a trial.
+    """Outcome of a trial.
 
     Attributes
     ----------
-    trial : Trial. hidden : what was hidden, ``effect (form)``. names : of the effects.
-    size : of the effect, the smaller one of two, alone over the smallest seen with 80 % power.
-    p_value, cause, ambiguous, second, second_ambiguous : of the answer. why : in words.
-    seconds : that the search took.
+    trial : Trial
+        What was tried.
+    hidden : tuple of str
+        Hidden effects, ``effect (form)``.
+    names : tuple of str
+        Names of the effects.
+    size : float
+        Size of the effect, the smaller one of two, alone over the minimum detectable one (80 %
+        power).
+    p_value : float
+        Of the answer.
+    cause, ambiguous, second, second_ambiguous : str or tuple of str
+        Named causes of the answer.
+    flagged : bool
+        Whether a misfit remains.
+    why : str
+        Reason in words.
+    seconds : float
+        Time of the search.
     """
 
     trial: Trial
@@ -80,7 +95,7 @@ class Outcome:
 
 
 def run_trial(trial: Trial, workers: int = 1) -> Outcome:
-    """Return what comes of a trial."""
+    """Run a trial and return its outcome."""
     laboratory = Laboratory(force=trial.force, rebound=trial.force)
     hidden = draw(trial.seed, trial.kind)
     with tempfile.TemporaryDirectory() as scratch:
@@ -124,16 +139,16 @@ def _size(
     problem: Problem,
     finding: Finding,
 ) -> float:
-    """Return the size of an effect over the smallest that would be seen.
+    """Return the size of an effect over the minimum detectable one.
 
-    The tests are made again without any noise, with the effect and without it. What the model as it
-    stands cannot take up of the effect, all uncertain values fitted anew, is the effect's strength
-    in standard errors; over those needed it is the size.
+    The tests are made again without noise, with and without the effect. The part of the effect that
+    the base model cannot absorb after a refit of all uncertain values is the effect's strength in
+    standard errors; its ratio to the standard errors needed is the size.
     """
     quiet = replace(
         laboratory, noise_sd=0.0, force_sd=0.0, rebound_sd=0.0, scatter=0.0, speed_sd=0.0
     )
-    # The repeatability that the real set was made with, not that of its noise-free twins.
+    # The repeatability of the real set, not that of its noise-free copies.
     scatter = Scatter(laboratory.scatter, 0.5 * laboratory.scatter)
     misfits = []
     for name, effects in (("with", [hidden]), ("without", [])):
@@ -147,7 +162,7 @@ def _size(
 
 
 def _as_measured(problem: Problem, folder: Path) -> Problem:
-    """Return a problem with the values of another folder, as uncertain as they were."""
+    """Return a problem with the values of another folder and unchanged uncertainties."""
     data = load_measured(folder)
     tests = []
     for test in problem.tests:

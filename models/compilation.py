@@ -21,14 +21,20 @@ from numba.core.caching import IndexDataCacheFile
 
 
 def _without_docstrings(tree: ast.AST) -> ast.AST:
-    """Return a tree without its docstrings, nested ones included."""
+    """Return a tree without docstrings, those below constants included."""
     for node in ast.walk(tree):
-        if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
-            continue
-        first = node.body[0] if node.body else None
-        if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
-            node.body = node.body[1:]
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            node.body = [line for line in node.body if not _is_text(line)]
     return tree
+
+
+def _is_text(line: ast.stmt) -> bool:
+    """Return whether a statement is a text alone."""
+    return (
+        isinstance(line, ast.Expr)
+        and isinstance(line.value, ast.Constant)
+        and isinstance(line.value.value, str)
+    )
 
 
 def digest_of(sources: Sequence[bytes]) -> str:
@@ -116,7 +122,7 @@ MERGED_FLAGS: Any = {
     "forceinline": True,
     "_nrt": False,
 }
-"""Numba flags of what is merged into a kernel without being one."""
+"""Numba flags of functions that are inlined into a kernel without being kernels."""
 
 
 def _compile(

@@ -12,7 +12,7 @@ from models.pedestrian.joints import Joints, joints_of
 Array = NDArray[np.float64]
 
 HEAVY = 1e8
-"""Mass (kg) and inertia (kg m2) of the base: beyond what head and neck can move."""
+"""Mass (kg) and inertia (kg m2) of the base: large enough that head and neck do not move it."""
 _ROWS = [SEGMENTS.index("neck"), SEGMENTS.index("head")]
 
 

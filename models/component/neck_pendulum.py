@@ -27,7 +27,7 @@ ARM, GAUGE = 1.80, 1.657
 """m from the pivot to the base of the neck and to the point whose speed is prescribed (recalled:
 49 CFR 572.33, figure 22)."""
 STEP = 2e-5
-"""s; the lightest segment's damping rate times it stays below one half."""
+"""s; the lightest segment's damping rate times the step stays below one half."""
 DURATION = 0.25
 """s after the pendulum meets its stop."""
 

@@ -8,7 +8,7 @@ SLIP_VELOCITY = 0.1
 """Slip (m/s) at which Coulomb friction reaches 71 % of its bound (regularisation, assumed)."""
 SLIP_RATE = 600.0
 """Largest friction coefficient per mass (1/s): keeps the regularised friction of a light body
-under a hard blow slower than the step (assumed)."""
+in a hard impact slower than the step (assumed)."""
 
 
 @inlined_kernel

@@ -14,7 +14,7 @@ from models.compilation import inlined_kernel, kernel
 
 ITERATIONS = 60
 TOLERANCE = 1e-7
-"""Last Newton turn (rad): the separation is then exact to its square times a semi-axis."""
+"""Last Newton step (rad): the error of the separation is its square times a semi-axis."""
 
 
 @inlined_kernel

@@ -21,10 +21,10 @@ from models.compilation import inlined_kernel, kernel
 Array = NDArray[np.float64]
 
 KNOTS = 32
-"""Knots that a combined law can hold; one side has half of them at most."""
+"""Largest number of knots of a combined law; each side has at most half of them."""
 
 DAMPING_ONSET = 0.005
-"""Penetration (m) over which the damping of a crash contact fades in (assumed: thin against the
+"""Penetration (m) over which the damping of a crash contact tapers in (assumed: small against the
 20 to 90 mm of a vehicle zone, so that the force has no jump at first touch)."""
 
 # Columns of a combined law.

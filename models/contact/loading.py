@@ -7,13 +7,13 @@ from scipy.optimize import nnls
 Array = NDArray[np.float64]
 
 MAX_KNOTS = 8
-"""Knots that a loading curve may have."""
+"""Largest number of knots of a loading curve."""
 SPACING = 0.08
 """Least distance of knots over the largest penetration (assumed)."""
 SWEEPS = 4
 """Rounds in which each knot is moved once."""
 FLATTEST = 1e-3
-"""Least slope of a fitted segment over the secant of the whole curve: a law must rise."""
+"""Least slope of a fitted segment over the secant of the whole curve, so that the law rises."""
 
 
 def fit_loading(depth: Array, force: Array, places: Array) -> Array:

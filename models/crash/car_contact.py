@@ -31,11 +31,11 @@ from models.crash.surfaces import (
 )
 
 ENTRY_DEPTH = 0.03
-"""Depth (m) within which a segment must first be seen by a zone; deeper, it came past the border
-(beside the fender, from under the bumper) and is not in contact (assumed, ten times the way of a
-step), unless a zone that shares a border hands it over."""
+"""Largest depth (m) of a segment at its first contact with a zone; a deeper one has passed the
+border (beside the fender, from under the bumper) and is not in contact (assumed, ten times the
+travel of a step), unless it comes from a zone that shares a border."""
 HANDED_DEEPER = 0.005
-"""Depth (m) by which a segment handed over may be deeper than it was before (assumed)."""
+"""Depth (m) by which a segment may be deeper than in the zone it comes from (assumed)."""
 
 
 @inlined_kernel

@@ -83,7 +83,7 @@ def _stack(curves: list[ForceCurve]) -> tuple[Array, Array, NDArray[np.int64], A
 RIGID = ForceCurve(np.array([0.0, 1e-6]), np.array([0.0, 1e5]), 1.0 + 1e-9)
 """The road: 100 kN/mm, far stiffer than any tissue."""
 ELASTIC = 1.000001
-"""Unloading ratio of what springs back fully; a force curve takes more than one."""
+"""Unloading ratio of an elastic body; a force curve requires more than one."""
 
 
 def build_ellipsoids(

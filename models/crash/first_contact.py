@@ -8,9 +8,9 @@ from models.crash.front import patch_count, separation_of
 from models.crash.surfaces import shape_of
 
 SEARCH_AHEAD = 1.5
-"""m ahead of the car from which the body is brought back until it touches."""
+"""m ahead of the car at which the search for first contact starts."""
 SEARCH_BEHIND = -0.6
-"""m behind the car's foremost point where the search for a first contact gives up."""
+"""m behind the car's foremost point where the search for first contact ends."""
 
 
 @kernel

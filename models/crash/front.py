@@ -49,7 +49,7 @@ FRONTS: dict[type, Answers] = {
         react=zone_front.zone_reaction,
     ),
 }
-"""By the type of a front how it answers."""
+"""Functions of each front geometry, by its type."""
 
 
 def _answered(question):

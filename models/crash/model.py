@@ -18,7 +18,7 @@ from models.vehicle.profile import Vehicle, load_vehicle
 Array = NDArray[np.float64]
 
 TICK = 1e-4
-"""Default finest step (s): HIC15 is within 0.7 % of its value at a quarter of it."""
+"""Default finest step (s): HIC15 is within 0.7 % of its value at a quarter of the step."""
 TIME_LIMIT = 12.0
 """s of crash after which a run counts as failed."""
 FRAME_INTERVAL = 2e-3

@@ -23,7 +23,7 @@ class EndReason(IntEnum):
 
 END_REASONS = tuple(reason.name.lower() for reason in EndReason)
 GOES_ON = -1
-"""In place of a reason: the run has not ended."""
+"""Value in place of a reason while the run has not ended."""
 
 
 class Column(IntEnum):
@@ -38,7 +38,7 @@ class Column(IntEnum):
     SPIN_RATE = 7
     """(3) head angular acceleration, own axes, rad/s2."""
     RELATIVE_VELOCITY = 10
-    """(3) of the head against the car, car axes, m/s."""
+    """(3) of the head relative to the car, car axes, m/s."""
     HEAD_CAR_FORCE = 13
     """(1) of the car on the head, N."""
     HEAD_ROAD_FORCE = 14
@@ -71,7 +71,7 @@ class HeadContact(IntEnum):
     TIME = 0
     """(1) s of first contact, NaN without any."""
     VELOCITY = 1
-    """(3) m/s, against the car, at the first blow."""
+    """(3) m/s, relative to the car, at the first impact."""
     NORMAL = 4
     """(3) at first contact."""
     POINT = 7
@@ -93,12 +93,12 @@ class Blow(IntEnum):
 
     START = 0
     VELOCITY = 1
-    """(3) m/s, against the car, at its start."""
+    """(3) m/s, relative to the car, at its start."""
     LAST = 4
     PEAK = 5
 
 
 HEAD_CONTACT_ENTRIES = HeadContact.POINT + 3
-"""Entries of a head contact."""
+"""Number of entries of ``HeadContact``."""
 BLOW_ENTRIES = Blow.PEAK + 1
-"""Entries of a blow."""
+"""Number of entries of ``Blow``."""

@@ -18,9 +18,9 @@ from models.crash.record import (
 )
 
 BLOW_GAP = 0.01
-"""s without force after which the head's next contact with an arm is another blow (assumed)."""
+"""s without force after which a contact of the head with an arm is a new impact (assumed)."""
 BLOW_FORCE = 300.0
-"""N that an arm must have put on the head to count as the head's first blow (assumed)."""
+"""Peak force (N) from which an arm contact counts as the head's first impact (assumed)."""
 
 
 @inlined_kernel

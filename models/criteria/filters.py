@@ -15,11 +15,11 @@ CUTOFF_FACTOR = 2.0775
 
 
 PADDING = 60
-"""Samples by which a signal is continued at either end, mirrored about its last point."""
+"""Samples by which a signal is padded at either end, mirrored about its end point."""
 
 
 SETTLED = 1e-3
-"""Share of a step that a filter still has to go after its settling time."""
+"""Remaining share of a step response after the settling time."""
 
 
 def settling_time(frequency_class: float) -> float:

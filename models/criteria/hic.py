@@ -24,9 +24,9 @@ Array = NDArray[np.float64]
 
 
 BLOCK = 8
-"""Windows with one start that one bound rules out together."""
+"""Number of windows with one start that share a bound."""
 SLACK = 1.0 - 1e-9
-"""Share of the best value that a bound must reach: rounding must rule out no maximum."""
+"""Share of the best value that a bound must reach, so that rounding excludes no maximum."""
 
 
 @kernel

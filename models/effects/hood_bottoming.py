@@ -14,7 +14,7 @@ from models.contact.law import ForceCurve
 REFERENCE = 0.010
 """Depth (m) beyond the clearance at which all powers have the same force."""
 DEPTHS = (0.002, 0.004, 0.007, 0.01, 0.014, 0.02, 0.04)
-"""Depths (m) beyond the clearance at which a curved law is cut into straight pieces."""
+"""Depths (m) beyond the clearance of the knots of a curved law."""
 
 NEAREST = 1e-6
 """m from a knot of the curve within which none is added."""

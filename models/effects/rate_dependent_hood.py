@@ -10,7 +10,7 @@ from dataclasses import replace
 from models.contact.headform import HeadformContact
 
 ONSET = 0.002
-"""m over which a dashpot fades in where the hood has none of its own (assumed: the force of a hood
+"""m over which a dashpot tapers in where the hood has none of its own (assumed: the force of a hood
 has no jump at first touch)."""
 
 

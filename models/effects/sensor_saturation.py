@@ -12,7 +12,7 @@ import numpy as np
 from models.effects.reading import Reading
 
 CLIPPING = 50.0
-"""Sharpness from which the knee is a corner."""
+"""Sharpness from which the signal is clipped."""
 
 
 def apply(reading: Reading, parameters: Mapping[str, float]) -> Reading:

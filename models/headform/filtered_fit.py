@@ -35,15 +35,15 @@ from models.headform.outcome import SAMPLING_RATE
 Array = NDArray[np.float64]
 
 STRIDE = 5
-"""Steps of the simulation a sample."""
+"""Simulation steps per sample."""
 LONGEST = 0.15
-"""s of contact after which a trial law is given up."""
+"""s of contact after which a trial law is rejected."""
 FINEST = 1e-4
-"""Change of a parameter from which its derivative is taken; all are logarithms or milliseconds."""
+"""Parameter perturbation of the finite differences; all are logarithms or milliseconds."""
 FLATTEST, STEEPEST = 1e2, 1e8
-"""N/m that a slope may have."""
+"""Bounds of a slope, N/m."""
 LEAST_RATIO, MAX_RATIO = 1.001, 1e3
-"""Of the unloading line, as for signals that are integrated."""
+"""Bounds of the unloading ratio, as for signals that are integrated."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ rounds and before the force curve bends, is extended to zero for first contact (
 FAR, NEAR = 0.25, 0.05
 """Shares of the peak from which the part before contact is sought, at first and at last."""
 OUT_OF_NOISE = 3.0
-"""Standard deviations that a signal has risen by when it is out of its noise."""
+"""Standard deviations above which a signal has risen out of its noise."""
 SLOW = 0.06
 """Share of the peak up to which a slow start is followed (assumed)."""
 LEAST_RISE = 0.02

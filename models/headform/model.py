@@ -55,16 +55,16 @@ Array = NDArray[np.float64]
 LONGEST_CONTACT = 1.0
 """s of contact after which a run counts as failed."""
 FINEST = 5
-"""Steps a sample, at least."""
+"""Smallest number of steps per sample."""
 PHASE = 0.05
 """Largest step times the highest natural frequency of the contact (1 is a radian)."""
 DAMPING_WEIGHT = 25.0
-"""How much finer a damping rate is stepped than a frequency: its force starts with a jump."""
+"""Weight of a damping rate against a frequency in the step: its force starts with a jump."""
 MAX_STEPS = 4000
-"""Steps a sample, at most."""
+"""Largest number of steps per sample."""
 
 ELASTIC = 1.000001
-"""Unloading ratio of what springs back fully; a force curve takes more than one."""
+"""Unloading ratio of an elastic spring; a force curve requires more than one."""
 
 TIME_LIMIT = "time_limit"
 NOT_FINITE = "not_finite"

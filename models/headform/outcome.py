@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 SAMPLING_RATE = 20_000.0
 """Hz of the accelerometer (SAE J211 asks for ten times the channel frequency class)."""
 QUIET = 0.005
-"""s of flight kept before and after the contact, at least: more where the filter needs it."""
+"""Least free flight (s) before and after the contact; more where the filter needs it."""
 
 
 @dataclass(frozen=True)

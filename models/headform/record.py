@@ -16,25 +16,25 @@ from models.criteria.units import STANDARD_GRAVITY
 Array = NDArray[np.float64]
 
 WINDOW = 0.001
-"""s over which the record is averaged to tell events (assumed)."""
+"""s over which the record is averaged to detect events (assumed)."""
 GAP = 0.003
-"""s that two events lie apart at least; a contact with two peaks is one (assumed)."""
+"""Least gap (s) of two events; a contact with two peaks is one event (assumed)."""
 SHORTEST = 0.002
-"""s that an impact lasts at least (assumed)."""
+"""Least duration (s) of an impact (assumed)."""
 LEVEL = 0.1
 """Share of the largest average from which on an event counts."""
 FOOT = 0.01
 """Share of the largest average from which on an event that reaches the level has begun."""
 LONGEST_FOOT = 0.005
-"""s that this may take at most: a drift is no event (assumed)."""
+"""Largest duration (s) of that rise: a drift is no event (assumed)."""
 SLOWEST = 0.05
-"""s in which an impact takes half of the speed at least: a softer rise is none (assumed)."""
-MAX_COUNT = 0.5
-"""Share of the speed that an impact takes at least; a rebound takes more than all of it."""
+"""Longest time (s) in which an impact removes half of the speed (assumed)."""
+MIN_SHARE = 0.5
+"""Least share of the speed that an impact removes; with rebound it is above one."""
 STOPPED = 0.97
 """Share of the speed from which on a headform counts as stopped: speed and mass are not exact."""
 SIZEABLE = 0.02
-"""Share of the speed from which on another event is told."""
+"""Share of the speed from which another event is reported."""
 OUT_OF_NOISE = 8.0
 """Standard deviations from which on a single sample is a spike (assumed)."""
 SPIKE = 0.2
@@ -44,11 +44,11 @@ LONELY = 0.25
 MIN_QUIET = 20
 """Samples between a disturbance and contact that are kept as quiet, if there are so many."""
 TOP, SHOULDER = 0.99, 0.95
-"""Shares of the peak whose durations tell a plateau from a round peak (assumed)."""
+"""Shares of the peak whose durations distinguish a plateau from a round peak (assumed)."""
 CLIPPED = 0.7
-"""Their ratio from which on a peak seems clipped: of a parabola it is 0.45 (assumed)."""
+"""Ratio of these durations above which a peak seems clipped; 0.45 for a parabola (assumed)."""
 MIN_FLAT = 4
-"""Samples that a plateau has at least."""
+"""Least number of samples of a plateau."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def first_impact(
     events = _events(a - base, step, speed)
     impact = next(
         (k for k, e in enumerate(events)
-         if e.speed >= MAX_COUNT * speed and (e.stop - e.start) * step >= SHORTEST),
+         if e.speed >= MIN_SHARE * speed and (e.stop - e.start) * step >= SHORTEST),
         None,
     )  # fmt: skip
     if impact is None:

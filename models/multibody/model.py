@@ -16,7 +16,7 @@ from models.multibody.stability import STABLE, joint_rate, stable_ticks, surface
 from models.pedestrian.anthropometry import HEAD, TRUNK
 
 COARSE, SLIDE, FLIGHT = 3, 6, 6
-"""Ticks a step in quiet contact with the car, on the road alone, and in free flight."""
+"""Ticks per step in quiet contact with the car, on the road alone, and in free flight."""
 
 _TABLE = data.load("multibody.toml")
 

@@ -39,7 +39,7 @@ HEAD = SEGMENTS.index("head")
 LARGEST_HEAD_SHARE = 0.5
 """Share of the body's mass beyond which a head is refused (assumed; a newborn's is about 0.3)."""
 BODY_MASS_INDEX = (8.0, 80.0)
-"""kg/m2 beyond which no body is (assumed; starved adults reach about 10, the heaviest about 75)."""
+"""kg/m2, possible range (assumed; starved adults reach about 10, the heaviest about 75)."""
 HEAD_INERTIA_FACTOR = 1.15
 """A skull carries its mass further out than a homogeneous ellipsoid: the data sheet allows 15 %
 more for the head [estimated]."""

@@ -34,9 +34,9 @@ def _address(pointer: Any) -> int:
 
 
 STEP_SPACE = _Function("cpSpaceStep", types.intp, types.float64)
-"""Of a space and a duration (s)."""
+"""Function of a space and a duration (s)."""
 EACH_BODY = _Function("cpSpaceEachBody", types.intp, types.intp, types.intp)
-"""Of a space, what to do with each body, and data for it."""
+"""Function of a space, a function to apply to each body, and its data."""
 READ_BODY = _address(ffi.addressof(lib, "pmSpaceBodyGetIteratorFuncBatched"))
 WRITE_BODY = _address(ffi.addressof(lib, "pmSpaceBodySetIteratorFuncBatched"))
 

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 CELLS = 256
 """Cells of a torque's table over one turn: 1.4 degrees, a seventh of a stop's onset."""
-MAX_SCORE = np.radians(170.0)
+MAX_ANGLE = np.radians(170.0)
 """rad from the centre of its range, at which a joint's torque stops growing: half a turn away the
 rotation vector jumps to the other side (assumed; no joint's range reaches so far)."""
 
@@ -91,7 +91,7 @@ def _torque_table(joints: Joints, body: PlanarBody) -> Array:
             np.outer(np.cos(0.5 * angle), start) + np.outer(np.sin(0.5 * angle), turned)
         )
         found = -np.diff(elastic_energy(joints, i, vector)) / width
-        far = np.linalg.norm(vector, axis=1) > MAX_SCORE
+        far = np.linalg.norm(vector, axis=1) > MAX_ANGLE
         torque[i] = _held(found, far[1:] | far[:-1])
     return torque
 

@@ -30,7 +30,7 @@ from models.planar.stepping import (
 )
 
 COARSE, FLIGHT, ROAD = 3, 6, 20
-"""Ticks a step in contact with the car, above it, and clear of it."""
+"""Ticks per step in contact with the car, above it, and clear of it."""
 
 _TABLE = data.load("planar.toml")
 _SPATIAL = data.load("multibody.toml")

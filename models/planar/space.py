@@ -21,15 +21,15 @@ from models.planar.joints import PlanarJoints
 Array = NDArray[np.float64]
 
 ITERATIONS = 10
-"""Sweeps of Pymunk's solver over joints and contacts a step; a hundred move HIC15 by 0.1 %."""
+"""Sweeps of Pymunk's solver per step over joints and contacts; a hundred move HIC15 by 0.1 %."""
 JOINT_RELAXATION = 0.005
-"""s in which a drifted joint closes again (assumed)."""
+"""Relaxation time (s) of a joint that has drifted (assumed)."""
 CONTACT_RELAXATION = 0.02
-"""s in which an overlap with the road is pushed out (assumed)."""
+"""Relaxation time (s) of an overlap with the road (assumed)."""
 SLOP = 1e-3
 """m of overlap with the road that Pymunk leaves."""
 CORNERS = 16
-"""Of the polygon that stands for a segment's shadow on the road: 1 % of its width."""
+"""Corners of the polygon for a segment's projection; its error is 1 % of the width."""
 REACH = 600.0
 """m of road ahead and behind: the fastest car of the inputs, over the time limit."""
 THICKNESS = 1.0

@@ -50,7 +50,7 @@ CLEAR = 0.1
 """m ahead of the car from which a segment cannot meet it within the longest step (assumed)."""
 
 FASTEST = 1e3
-"""m/s of segments on average beyond which a run has come apart (assumed)."""
+"""Root mean square segment speed (m/s) beyond which a run has diverged (assumed)."""
 
 
 class PlanarMotion(NamedTuple):

@@ -60,6 +60,7 @@ PLAIN = b"def double(x):\n    return 2.0 * x\n\nRATE = 3.0\n"
     [
         b'"""What."""\n\n# Why.\ndef double(x):\n    "Two."\n    return 2.0 * x\nRATE = 3.0\n',
         b"def double(x):\n    return (2.0\n            * x)\n\n\n\nRATE=3.0",
+        PLAIN + b'"""Of what, and its source."""\n',
     ],
 )  # fmt: skip
 def test_comments_docstrings_and_layout_compile_nothing_anew(same: bytes) -> None:

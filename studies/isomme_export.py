@@ -65,8 +65,8 @@ def _write(
 ) -> Path:
     channels = {}
     head = run.histories["head"].time
-    for name, traits in model.channels.items():
-        group, _, channel = name.partition("_")
+    for measured, traits in model.channels.items():
+        group, _, channel = measured.partition("_")
         history = run.histories.get(group)
         if traits.code and history is not None and channel in history.channels:
             values = history.channels[channel][phase]

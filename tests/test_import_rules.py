@@ -68,7 +68,7 @@ def test_the_command_line_starts_without_physics_or_figures() -> None:
 
 def test_methods_load_without_physics_or_figures() -> None:
     methods = (
-        "studyfile.config", "sampling.designs", "studyfile.distributions", "execution.runner",
+        "studyfile.study_inputs", "sampling.designs", "studyfile.distributions", "execution.runner",
         "execution.results", "statistics", "text", "units",
     )  # fmt: skip
     names = loaded("import " + ", ".join(f"mcstudy.{name}" for name in methods))

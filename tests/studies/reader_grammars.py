@@ -181,8 +181,6 @@ def spoilt_bytes(draw: Draw, text: str, often: int = 4) -> bytes:
     return bytes(draw(st.sampled_from(DAMAGED))(raw, at, junk))
 
 
-# -- study files -----------------------------------------------------------------------------
-
 INPUTS: dict[str, Any] = {
     "impact_speed": {"distribution": "normal", "unit": "km/h", "mean": 30.0, "sd": 3.0,
                      "low": 20.0, "high": 40.0},
@@ -378,8 +376,6 @@ def study_files(draw: Draw, studies: Mapping[str, Any]) -> bytes:
     return raw
 
 
-# -- tables of cases -------------------------------------------------------------------------
-
 CELLS = (
     "", " ", "0", "1", "-1", "yes", "no", "TRUE", "False", "1.0", "NA", "n/a", "nan", "null", "inf",
     "-inf", "Infinity", "1e308", "1e400", "1e-400", "5e-324", "1e100", "1e101", "9" * 250, "1,5",
@@ -536,8 +532,6 @@ def parquet_files(draw: Draw) -> bytes:
     at = draw(st.integers(0, len(raw) - 1))
     return draw(st.sampled_from([raw[:at], raw[:at] + b"\xff" + raw[at + 1 :], raw[at:], b""]))
 
-
-# -- headform tests --------------------------------------------------------------------------
 
 RATE = 1e-4
 

@@ -122,9 +122,6 @@ def cells_of(figure: Figure) -> list[str]:
     return [text.get_text() for text in figure.axes[0].texts]
 
 
-# -- each kind of study -----------------------------------------------------------------------
-
-
 def test_monte_carlo_says_and_draws_what_is_constant(tmp_path: Path, drawn: Figures) -> None:
     inputs = FLAT_SPEED + INPUTS[INPUTS.index("[inputs.headform_mass]") :]
     references = (
@@ -246,9 +243,6 @@ def test_an_injury_study_without_a_run_left_says_where(tmp_path: Path) -> None:
     said = "scenario reference, front car: all runs failed"
     with by_formula(failing), pytest.raises(StudyError, match=said):
         ran(study_text("injury", limit=1.0), tmp_path / "out")
-
-
-# -- values of any size and shape -------------------------------------------------------------
 
 
 def sizes(kind: str, entry: Mapping[str, Any]) -> list[float]:

@@ -107,9 +107,6 @@ def study_file(path: Path, text: str) -> Path:
     return path
 
 
-# -- from file to folder ----------------------------------------------------------------------
-
-
 def test_the_folder_holds_study_runs_analysis_figures_and_report(
     kind: str, finished: ResultsFolder
 ) -> None:
@@ -260,9 +257,6 @@ def test_the_command_line_prints_the_result_as_words_or_as_one_object(
     assert again.read_json("analysis.json") == content["analysis"] == api.build_report(again)
 
 
-# -- what is refused --------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("edit", "differs"),
     [
@@ -359,9 +353,6 @@ def test_sensitivity_is_measured_where_runs_are_a_sample_alone(
     refused = f"is the folder of a study of kind {kind}"
     assert ("of a Morris study" if kind == "morris" else refused) in told(answer)
     assert not (folder.path / "sensitivity").exists()
-
-
-# -- unfinished and foreign folders -----------------------------------------------------------
 
 
 def test_an_unfinished_folder_tells_to_go_on_or_reports_its_whole_parts(

@@ -131,9 +131,6 @@ def write(folder: Path, files: Mapping[str, bytes]) -> Path:
     return folder
 
 
-# -- what is done with a drawn file ----------------------------------------------------------
-
-
 def check_study(raw: bytes, folder: Path) -> None:
     """A study file comes to its runs, or is refused in one line."""
     path, out = folder / "study.toml", folder / "out"
@@ -200,8 +197,6 @@ def check_tests(files: Mapping[str, bytes], folder: Path) -> None:
     assert {path: path.read_bytes() for path in source.rglob("*") if path.is_file()} == before
 
 
-# -- the tests -------------------------------------------------------------------------------
-
 Check = Callable[[Any, Path], None]
 PAPER = grammars.paper_studies(CONFIGS)
 READERS: dict[str, tuple[st.SearchStrategy[Any], Check, int, int]] = {
@@ -248,8 +243,6 @@ def test_thousands_of_files_are_read_or_refused_in_one_line(
 ) -> None:
     fuzz(reader, tmp_path_factory, settings(SLOW, max_examples=READERS[reader][3]))
 
-
-# -- what is written is read back ------------------------------------------------------------
 
 ROUND = settings(FAST, max_examples=25)
 AXES = tuple(f"D0HEADCG00PCAC{axis}A" for axis in "XYZ")
@@ -356,9 +349,6 @@ def test_a_reconstruction_exported_as_iso_mme_is_read_back(tmp_path: Path) -> No
     head = run.histories["head"]
     np.testing.assert_allclose(time, head.time, atol=1e-9)
     np.testing.assert_allclose(values, head.channels["acceleration"], rtol=5.1e-7, atol=1e-30)
-
-
-# -- what fuzzing has found ------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", ["monte-carlo", "reconstruction"])

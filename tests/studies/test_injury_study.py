@@ -214,9 +214,6 @@ def by_replicate(part: pd.DataFrame, column: str) -> Array:
     return (0.75 * means["sedan"] + 0.25 * means["suv"]).to_numpy(dtype=float)
 
 
-# -- cells and common random numbers ----------------------------------------------------------
-
-
 def test_every_scenario_meets_every_front(full: ResultsFolder) -> None:
     scenarios = ["reference", "slower", "softer"]
     names = [f"{s}/{f}" for s in scenarios for f in ("sedan", "suv")]
@@ -277,9 +274,6 @@ def test_inputs_of_the_cells_are_those_of_a_monte_carlo_study(full: ResultsFolde
     runs = cell(full, "reference.sedan").runs()
     for name in ("impact_speed", "headform_mass", "hood_force_scale"):
         assert runs[name].to_numpy().tobytes() == columns[name].tobytes()
-
-
-# -- going on and refusing --------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -352,9 +346,6 @@ def test_children_and_fronts_of_the_multibody_model(tmp_path: Path) -> None:
     speeds = cases.pivot_table(index="run", columns=["scenario", "front"], values="impact_speed")
     ratio = speeds["slower"]["high_front"] / speeds["reference"]["family_car"]
     assert ratio.to_numpy() == pytest.approx(0.6, rel=1e-9)
-
-
-# -- population numbers -----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("scenario", ["reference", "slower", "softer"])
@@ -473,9 +464,6 @@ def test_intervals_hold_the_truth_as_often_as_they_say(design: str) -> None:
             hits.append((level["low"] <= slower <= level["high"], held))
     # Of 20 intervals of 95 % at least 16 hold the truth, but for three times in a thousand.
     assert np.sum(hits, axis=0).min() >= 16
-
-
-# -- outcomes ---------------------------------------------------------------------------------
 
 
 def test_risks_are_weighted_means_of_the_published_functions(full: ResultsFolder) -> None:
@@ -608,9 +596,6 @@ def test_all_observed_injuries_together_lie_within_their_bounds(full: ResultsFol
     assert min(single) >= joint["dependent"] > joint["independent"] > math.prod(single)
 
 
-# -- the limit as a classifier ----------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("value", "level"), [(700.0, 3), (500.0, 2)])
 def test_the_limit_is_judged_by_the_risks_of_the_runs(value: float, level: int) -> None:
     text = study_text(
@@ -664,8 +649,6 @@ def test_a_limit_that_no_run_exceeds_is_reported(tmp_path: Path) -> None:
     assert found["above_limit"]["value"] == found["limit"]["head"]["sensitivity"]["value"] == 0.0
     assert found["limit"]["head"]["positive"]["value"] is None
 
-
-# -- risk against impact speed ----------------------------------------------------------------
 
 ANY_SPEED = UNIFORM_SPEED.replace(
     "[inputs.", '[scenarios.any]\ntitle = "any"\n[scenarios.any.inputs.'
@@ -763,8 +746,6 @@ def test_a_scenario_of_one_fixed_speed_leaves_the_curve_whole(tmp_path: Path) ->
     assert speed["halved"]["AIS3+ head"]["value"] is not None
 
 
-# -- what is refused --------------------------------------------------------------------------
-
 _HEAD, _, _REST = Path("configs/population_injury.toml").read_text().partition("[scenarios.slower]")
 _OLDER = """[scenarios.older]
 title = "all of 12 years"
@@ -854,9 +835,6 @@ def test_wrong_studies_get_one_line_and_write_nothing(tmp_path: Path, case: str)
     study = written(tmp_path / "bad.toml", text)
     assert message in told(mcstudy("run", study, "--out", tmp_path / "deep" / "out"))
     assert [path.name for path in tmp_path.iterdir()] == ["bad.toml"]
-
-
-# -- small and degenerate studies -------------------------------------------------------------
 
 
 def test_a_study_of_one_replicate_has_no_intervals(tmp_path: Path) -> None:

@@ -54,9 +54,6 @@ def copied(
     return folder
 
 
-# -- fit-stiffness ---------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
     """Return the folder and the printed JSON of the example."""
@@ -224,8 +221,6 @@ def test_the_example_is_what_its_script_makes(
         # Rounded to 0.001 g: another machine may round the last digit the other way.
         np.testing.assert_allclose(made, held, atol=1.01e-3)
 
-
-# -- studies of the headform -----------------------------------------------------------------
 
 STUDY = """\
 format = "mcstudy-study/1"

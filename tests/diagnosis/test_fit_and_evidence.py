@@ -11,7 +11,7 @@ from mcstudy.diagnosis.marginal import Marginal, log_bayes_factor, quadratic_for
 from mcstudy.diagnosis.model_selection import rank_causes, settle
 from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Problem
-from mcstudy.diagnosis.search import fit_base, search
+from mcstudy.diagnosis.search import UNEXPLAINED, fit_base, search
 
 SCATTER = Scatter(0.01, 0.003)
 
@@ -144,6 +144,7 @@ def test_no_cause_no_alarm_and_a_cause_is_named() -> None:
     assert search(make_problem(6), [BUMP]).adequate
     found = search(make_problem(7, bump=1.0), [BUMP])
     assert (found.cause, found.ambiguous, found.second) == ("bump", (), None)
+    assert search(make_problem(7, bump=1.0), []).cause == UNEXPLAINED
 
 
 @pytest.mark.slow

@@ -81,25 +81,26 @@ CATALOGUED = [
     Hidden("rate_dependent_hood", "dashpot", {"damping": 40.0}),
     Hidden("sensor_saturation", "catalogue", {"limit": 110.0}),
 ]
+AGEING = Hidden("ageing", "", {"loss": 0.03})
 FOREIGN = [Hidden("ageing", "", {"loss": 0.01}), Hidden("cable", "", {"size": 0.8})]
 
 
-@pytest.mark.parametrize(("hidden", "cause"), [([BOTTOMING], "hood_bottoming"), ([], None)])
+@pytest.mark.parametrize(
+    ("hidden", "cause"),
+    [([BOTTOMING], "hood_bottoming"), ([], None), ([AGEING], "unexplained")],
+)
 def test_a_few_tests_name_what_is_hidden_among_few_causes_and_nothing_else(
     hidden: list[Hidden], cause: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     where = "studies.validation.diagnosis.trial"
     few = [c for c in causes_of("headform") if c.name in ("hood_bottoming", "sensor_offset")]
-    monkeypatch.setattr(f"{where}.Laboratory", partial(Laboratory, tests=5))
+    monkeypatch.setattr(f"{where}.Laboratory", partial(Laboratory, tests=6))
     monkeypatch.setattr(f"{where}.causes_of", lambda _: few)
     outcome = trial(hidden, 21, monkeypatch)
-    assert (outcome.cause, outcome.named, outcome.second) == (
-        cause,
-        (cause,) if cause else (),
-        None,
-    )
+    names = (cause,) if hidden == [BOTTOMING] else ()
+    assert (outcome.cause, outcome.named, outcome.second) == (cause, names, None)
     assert outcome.detected == (cause is not None)
-    assert (outcome.size > 2.0) if cause else outcome.size == 0.0
+    assert (outcome.size > 2.0) if hidden else outcome.size == 0.0
 
 
 @pytest.mark.slow

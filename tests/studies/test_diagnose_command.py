@@ -15,10 +15,12 @@ from headform_studies import assert_stands_alone, mcstudy, told, without_figures
 
 from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder
+from mcstudy.measurement.measured_data import load_measured
 from studies.api import run_study
 from studies.diagnosis import study as diagnosis
 from studies.diagnosis import words
 from studies.diagnosis.causes import causes_of
+from studies.diagnosis.model_choice import choose_model
 from studies.diagnosis.study import diagnose
 from studies.kinds import load_study
 from studies.monte_carlo.schema import MonteCarloStudy
@@ -97,11 +99,13 @@ def test_the_gain_is_that_of_held_out_tests(gain: Any) -> None:
 
 
 def test_the_extended_model_is_a_study_that_runs(gain: Any, tmp_path: Path) -> None:
-    _, folder, answer = gain
+    data, folder, answer = gain
     text = (folder.path / "extended.toml").read_text()
     study = load_study(folder.path / "extended.toml")
     assert isinstance(study, MonteCarloStudy)
     assert list(study.effects) == ["sensor_gain"]
+    choice = choose_model(load_measured(data), folder.path / "extended.toml")
+    assert list(choice.effects) == ["sensor_gain"]
     short = text.replace("n = 1000", "n = 200")
     assert short != text
     (tmp_path / "short.toml").write_text(short)

@@ -487,6 +487,24 @@ def test_hundreds_of_spoilt_folders_are_told_in_one_line(
         check_spoilt(kind, finished.path, tmp_path_factory, options)
 
 
+Frame = pd.DataFrame
+DAMAGE: dict[str, tuple[dict[str, Any], Callable[[Frame], Frame], str]] = {
+    "no design": ({"design": 3}, Frame.copy, "has no table 'design'"),
+    "cells": ({"design": {"n": 1, "cells": ["../x"]}}, Frame.copy, "must be names of folders"),
+    "text": ({}, lambda runs: runs.assign(hic15="x"), "'hic15' of its runs holds no numbers"),
+    "no run": ({}, lambda runs: runs.drop(columns="run"), "holds no runs"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DAMAGE)
+def test_known_damage_is_told_as_such(folder: ResultsFolder, name: str, undrawn: None) -> None:
+    change, damage, message = DAMAGE[name]
+    part = parts_of(folder)[0]
+    damage(part.runs()).to_parquet(part.path / "runs.parquet")
+    folder.write_json("manifest.json", folder.read_json("manifest.json") | change)
+    assert message in told(mcstudy("status" if change else "report", folder.path))
+
+
 def test_text_in_the_runs_is_no_markup_in_the_report(folder: ResultsFolder, undrawn: None) -> None:
     for part in parts_of(folder):
         runs = part.runs()

@@ -8,6 +8,9 @@ from headform_studies import run_text, study_text, without_figures
 
 from mcstudy.execution.results import ResultsFolder
 from models.registry import load_model
+from studies.kinds import load_study
+from studies.monte_carlo.schema import MonteCarloStudy
+from studies.monte_carlo.study import MonteCarlo
 
 PAPER = (
     Path("configs/paper_study.toml")
@@ -42,6 +45,16 @@ def test_analysis_judges_the_accident(folder: ResultsFolder) -> None:
     assert analysis["observed"]["wad"][0]["value"] == pytest.approx(1.35)
     above = analysis["exceedance"]["hic15"][0]["probability_above"]["value"]
     assert above == pytest.approx((runs["hic15"].dropna() > 700.0).mean())
+
+
+def test_every_figure_is_made(folder: ResultsFolder) -> None:
+    study, kind = load_study(folder.path / "study.toml"), MonteCarlo()
+    assert isinstance(study, MonteCarloStudy)
+    runs, analysis = kind.results(study, folder), folder.read_json("analysis.json")
+    figures = kind.draw(study, runs, analysis)
+    assert {"impact_speed", "throw_and_wad"} <= set(figures)
+    shown = [f for part in kind.sections(study, runs, analysis, figures) for f in part.figures]
+    assert len(shown) >= len(figures)
 
 
 def test_histories_of_the_first_run_belong_to_it(folder: ResultsFolder) -> None:

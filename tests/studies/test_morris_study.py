@@ -304,3 +304,6 @@ def test_a_sentence_names_at_most_four_factors_and_no_weak_ones_if_there_are_non
     assert "input 3" in text
     assert "input 4" not in text
     assert "Not distinguishable" not in text
+    noise = {"age": effect(0.1, 0.1, clear=False), "dummy": effect(0.1, 0.1, clear=False)}
+    text = morris_report.sentence("hic15", entry | {"factors": noise})
+    assert text == "HIC15: no factor is distinguishable from noise."

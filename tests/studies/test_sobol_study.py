@@ -34,6 +34,7 @@ from mcstudy.execution.results import ResultsFolder, digest
 from models.registry import load_model
 from studies import api
 from studies.failure_report import failure_map
+from studies.kinds import KINDS, parse_study
 from studies.sobol import report as sobol_report
 from studies.sobol import study as sobol
 
@@ -195,9 +196,12 @@ def test_a_group_of_dependent_inputs_has_the_index_of_its_sum(tmp_path: Path, fa
 
 
 def test_every_figure_is_made(folder: ResultsFolder) -> None:
-    figures = sobol_report.draw(folder.read_json("analysis.json"))
+    study, kind, analysis = parse_study(SECOND), KINDS["sobol"], folder.read_json("analysis.json")
+    figures = sobol_report.draw(analysis)
     wanted = {"indices", "heatmap", "convergence", "main_effects_hic15", "second_order_hic15"}
     assert set(figures) == wanted
+    sections = kind.sections(study, kind.results(study, folder), analysis, figures)
+    assert sum(len(section.figures) for section in sections) == len(wanted)
 
 
 def test_doubling_stops_at_the_first_design_within_the_tolerance(

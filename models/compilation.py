@@ -141,7 +141,8 @@ def _compile(
         place = f"{function.__module__}.{function.__qualname__}"
         file: Callable[..., Any] = IndexDataCacheFile
         compiled._cache._cache_file = file(compiled._cache.cache_path, place, _DIGEST)
-    return compiled  # type: ignore[no-any-return]
+    dispatcher: Callable[..., Any] = compiled
+    return dispatcher
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -6,7 +6,9 @@ sections as a subclass of ``StudyKind``, and one line in ``studies.kinds``.
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Generic, TypeVar
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, ClassVar, Generic, TypeVar, get_args
 
 from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder
@@ -18,6 +20,25 @@ from studies.publishing import publish
 Study = TypeVar("Study", bound=AnyStudy)
 Plan = TypeVar("Plan")
 Results = TypeVar("Results")
+
+
+@dataclass(frozen=True)
+class Finished(Generic[Study, Results]):
+    """A study whose runs are analysed: what figures and report are made of.
+
+    Attributes
+    ----------
+    study : AnyStudy
+        Study file of the kind, checked.
+    results : Results
+        From ``StudyKind.results``.
+    analysis : mapping
+        From ``StudyKind.analyse``, as read from ``analysis.json``.
+    """
+
+    study: Study
+    results: Results
+    analysis: Mapping[str, Any]
 
 
 class StudyKind(ABC, Generic[Study, Plan, Results]):
@@ -92,13 +113,14 @@ class StudyKind(ABC, Generic[Study, Plan, Results]):
         """
         results = self.results(study, folder)
         analysis = self.analyse(study, results)
+        done = partial(Finished, study, results)
         return publish(
             folder,
             study.title,
-            self.subtitle(study, results, analysis),
+            self.subtitle(done(analysis)),
             analysis,
-            lambda held: self.draw(study, results, held),
-            lambda held, figures: self.sections(study, results, held, figures),
+            lambda held: self.draw(done(held)),
+            lambda held, figures: self.sections(done(held), figures),
         )
 
     @abstractmethod
@@ -163,56 +185,18 @@ class StudyKind(ABC, Generic[Study, Plan, Results]):
         """
 
     @abstractmethod
-    def subtitle(self, study: Study, results: Results, analysis: Mapping[str, Any]) -> str:
-        """Return the line below the report's title.
-
-        Parameters
-        ----------
-        study : AnyStudy
-            Study file of this kind, checked.
-        results : Results
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        """
+    def subtitle(self, done: Finished[Study, Results]) -> str:
+        """Return the line below the report's title."""
 
     @abstractmethod
-    def draw(
-        self, study: Study, results: Results, analysis: Mapping[str, Any]
-    ) -> Mapping[str, Any]:
-        """Return the figures by file name.
-
-        Parameters
-        ----------
-        study : AnyStudy
-            Study file of this kind, checked.
-        results : Results
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        """
+    def draw(self, done: Finished[Study, Results]) -> Mapping[str, Any]:
+        """Return the figures by file name."""
 
     @abstractmethod
     def sections(
-        self,
-        study: Study,
-        results: Results,
-        analysis: Mapping[str, Any],
-        figures: Mapping[str, Any],
+        self, done: Finished[Study, Results], figures: Mapping[str, Any]
     ) -> Sequence[Section]:
-        """Return the sections of the report.
-
-        Parameters
-        ----------
-        study : AnyStudy
-            Study file of this kind, checked.
-        results : Results
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        figures : mapping
-            From ``draw``: figures by file name.
-        """
+        """Return the sections of the report, from what ``draw`` returns."""
 
     @abstractmethod
     def summarise(self, analysis: Mapping[str, Any]) -> list[str] | list[Table]:
@@ -247,4 +231,4 @@ class StudyKind(ABC, Generic[Study, Plan, Results]):
     @property
     def name(self) -> str:
         """Name of the kind in study files."""
-        return str(self.schema.model_fields["kind"].annotation.__args__[0])  # type: ignore[union-attr]
+        return str(get_args(self.schema.model_fields["kind"].annotation)[0])

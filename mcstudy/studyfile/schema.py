@@ -1,6 +1,7 @@
 """Tables that study files of several kinds share: one class a table."""
 
 import re
+from abc import abstractmethod
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -99,10 +100,15 @@ class Dependence(StudyTable):
     correlations: list[Annotated[tuple[str, str, FiniteFloat], Strict(False)]] = []
 
 
-class Report(StudyTable):
-    """``[report]``: outputs to draw (see ``report_outputs``), references, histories kept."""
+class OutputReport(StudyTable):
+    """``[report]`` of any study of runs: its outputs (see ``report_outputs``)."""
 
     outputs: Annotated[list[str], Field(min_length=1)] | None = None
+
+
+class Report(OutputReport):
+    """``[report]`` of a Monte Carlo study: outputs to draw, references, histories kept."""
+
     histories: NonNegativeInt = 8
     references: list[Reference] = []
 
@@ -162,15 +168,11 @@ class SampledStudy(CommonStudy, Limits):
 
     inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
     dependence: Dependence = Dependence()
+    report: OutputReport = OutputReport()
 
-    @property
-    def reported(self) -> list[str] | None:
-        """Outputs that the study names for its report; None if it names none."""
-        raise NotImplementedError
-
+    @abstractmethod
     def design_topics(self) -> dict[str, Any]:
         """Return the design settings that change the numbers of a run, by topic."""
-        raise NotImplementedError
 
 
 class FactorStudy(SampledStudy):
@@ -203,8 +205,7 @@ class FactorStudy(SampledStudy):
         }
 
 
-class FactorReport(StudyTable):
+class FactorReport(OutputReport):
     """``[report]`` of a factor study: outputs to rank, resamples of the intervals."""
 
-    outputs: Annotated[list[str], Field(min_length=1)] | None = None
     resamples: Annotated[int, Field(ge=100, le=100_000)] = 1000

@@ -17,11 +17,11 @@ def report_outputs(study: SampledStudy, model: Simulator) -> list[str]:
     UserError
         If the model lacks one of them.
     """
-    if study.reported is None:
+    if study.report.outputs is None:
         known = [item.name for item in model.outputs]
         return [name for name in USUAL_OUTPUTS if name in known] or known[:3]
-    check_outputs(study.reported, model, "report.outputs")
-    return study.reported
+    check_outputs(study.report.outputs, model, "report.outputs")
+    return study.report.outputs
 
 
 def check_outputs(names: Sequence[str], model: Simulator, place: str) -> None:

@@ -6,6 +6,7 @@ new geometry (a surface of facets, a patch that deforms) is a named tuple, these
 and one line in ``FRONTS``.
 """
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -55,18 +56,21 @@ FRONTS: dict[type, Answers] = {
 def _answered(question):
     """Select, by the type of the front, the function that is compiled into a caller."""
 
-    @overload(question, jit_options=MERGED_FLAGS)
+    @functools.wraps(question)
+    def stub(*_arguments):
+        raise NotImplementedError(f"{question.__name__} is for compiled code only")
+
+    @overload(stub, jit_options=MERGED_FLAGS)
     def _choose(front, *rest):
         answer = getattr(FRONTS[front.instance_class], question.__name__)
         return lambda front, *rest: answer(front, *rest)
 
-    return question
+    return stub
 
 
 @_answered
 def patch_count(front):
     """Return the number of patches of a front."""
-    raise NotImplementedError("compiled code only")
 
 
 @_answered
@@ -84,7 +88,6 @@ def is_near(front, patch, margin, x, z):
     x, z : float
         Point in the car's frame, m.
     """
-    raise NotImplementedError("compiled code only")
 
 
 @_answered
@@ -102,7 +105,6 @@ def is_across(front, patch, margin, y):
     y : float
         Lateral position in the car's frame, m.
     """
-    raise NotImplementedError("compiled code only")
 
 
 @_answered
@@ -131,7 +133,6 @@ def separation_of(front, ellipsoids, contacts, patch, segment, cx, cy, cz, cosin
         contact), normal and deepest point (m) in the car's frame, weight 0 to 1 of the force, and
         region whose law applies.
     """
-    raise NotImplementedError("compiled code only")
 
 
 @_answered
@@ -145,19 +146,16 @@ def are_joined(front, patch, other):
     patch, other : int
         Rows of the patches.
     """
-    raise NotImplementedError("compiled code only")
 
 
 @_answered
 def friction_of(front, region):
     """Return the coefficient of friction of a region."""
-    raise NotImplementedError("compiled code only")
 
 
 @_answered
 def ploughing_of(front, region):
     """Return the share of the ploughing resistance of a lasting dent in a region."""
-    raise NotImplementedError("compiled code only")
 
 
 @_answered
@@ -175,4 +173,3 @@ def react(front, patch, px, py, pz, fx, fy, fz):
     fx, fy, fz : float
         Force in world axes, N.
     """
-    raise NotImplementedError("compiled code only")

@@ -159,28 +159,33 @@ class Signals:
         """Head acceleration, angular velocity and angular acceleration (n, 9), unfiltered."""
         return self.sampled(Column.ACCELERATION, 9, self.head_time)
 
+    def _unfiltered(self, column: Column) -> Array:
+        """Return one of these signals (n, 3)."""
+        first = column - Column.ACCELERATION
+        return self._motion[:, first : first + 3]
+
     @functools.cached_property
     def acceleration(self) -> Array:
         """Resultant acceleration (n,) in g."""
         raw = self._raw
-        felt = Reading(self._motion[:, :3] / STANDARD_GRAVITY, raw.classes.linear)
+        felt = Reading(self._unfiltered(Column.ACCELERATION) / STANDARD_GRAVITY, raw.classes.linear)
         read = record_reading(raw.chain, raw.values, felt, SAMPLING_RATE, origin=0)
         return resultant(read.acceleration)
 
-    def _angular(self, first: int) -> Array:
-        signal = self._motion[:, first : first + 3]
+    def _angular(self, column: Column) -> Array:
+        signal = self._unfiltered(column)
         frequency_class = self._raw.classes.angular
         return filter_cfc(signal, SAMPLING_RATE, frequency_class) if frequency_class else signal
 
     @functools.cached_property
     def spin(self) -> Array:
         """Angular velocity (n, 3) in rad/s, own axes."""
-        return self._angular(3)
+        return self._angular(Column.SPIN)
 
     @functools.cached_property
     def spin_rate(self) -> Array:
         """Angular acceleration (n, 3) in rad/s2, own axes."""
-        return self._angular(6)
+        return self._angular(Column.SPIN_RATE)
 
 
 def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:

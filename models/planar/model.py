@@ -14,13 +14,14 @@ from models.crash.surfaces import CHANNELS, Contacts, empty_contacts
 from models.declaration import read_channels, read_inputs, read_outputs
 from models.effects.registry import effects_of
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
-from models.planar import stepping
 from models.planar.body import PlanarBody, hold_in_plane, surfaces_in_plane
 from models.planar.chipmunk import EACH_BODY, STEP_SPACE
 from models.planar.joints import joints_in_plane
 from models.planar.recording import Memory
 from models.planar.space import STATE, PlanarSpace
 from models.planar.stepping import (
+    PlanarCoreData,
+    PlanarCoreModel,
     PlanarMotion,
     PlanarSettings,
     empty_loads,
@@ -77,11 +78,11 @@ class PlanarModel(CrashModel):
             step_limit=self._record.shape[0] - 1, frame_every=round(FRAME_INTERVAL / self.tick),
             head=HEAD, trunk=max(TRUNK),
         )  # fmt: skip
-        model = stepping.PlanarModel(
+        model = PlanarCoreModel(
             space.link, body, joints, ellipsoids, scenario.zones, scenario.road, car_motion,
             settings,
         )  # fmt: skip
-        data = stepping.PlanarData(
+        data = PlanarCoreData(
             state=space.state, given=space.given, motion=motion, loads=empty_loads(n),
             contacts=contacts, orientation=np.zeros((n, 4)), car=np.zeros(6),
             power=np.zeros(CHANNELS), memory=np.zeros(len(Memory)),

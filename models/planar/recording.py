@@ -38,8 +38,8 @@ def write_row(row, time, model, data):
         Row of the record.
     time : float
         s.
-    model : PlanarModel
-    data : PlanarData
+    model : PlanarCoreModel
+    data : PlanarCoreData
         ``record`` is filled.
     """
     body, road, head = model.body, model.road, model.settings.head
@@ -142,7 +142,7 @@ def note_landing(time, settings, data):
     time : float
         s.
     settings : PlanarSettings
-    data : PlanarData
+    data : PlanarCoreData
         ``summary`` and ``memory`` are updated.
     """
     motion, contacts, memory, summary = data.motion, data.contacts, data.memory, data.summary

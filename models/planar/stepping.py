@@ -118,7 +118,7 @@ class PlanarSettings(NamedTuple):
     trunk: int
 
 
-class PlanarModel(NamedTuple):
+class PlanarCoreModel(NamedTuple):
     """Data that are constant during a run.
 
     Attributes
@@ -146,7 +146,7 @@ class PlanarModel(NamedTuple):
     settings: PlanarSettings
 
 
-class PlanarData(NamedTuple):
+class PlanarCoreData(NamedTuple):
     """State, loads, workspace and recorded arrays, all changed during a run.
 
     Attributes
@@ -348,8 +348,8 @@ def simulate(step_space, each_body, model, data):
     ----------
     step_space, each_body : callables
         As in ``models.planar.chipmunk``.
-    model : PlanarModel
-    data : PlanarData
+    model : PlanarCoreModel
+    data : PlanarCoreData
         Changed in place; record, frames, head contact and summary are filled.
     """
     settings, memory, contacts = model.settings, data.memory, data.contacts

@@ -25,7 +25,7 @@ from studies.injury.analysis import CASES, analyse, outcomes_of
 from studies.injury.cells import Cell, cells_of
 from studies.injury.report import draw, sections_of, summarise
 from studies.injury.schema import InjuryStudy
-from studies.kind import StudyKind
+from studies.kind import Finished, StudyKind
 from studies.monte_carlo.design import sample_inputs
 from studies.paired_runs import PreparedCell, cell_folder, cell_runs, run_cells
 from studies.runs import check_failure_rate, load_study_model
@@ -59,15 +59,7 @@ class Injury(StudyKind[InjuryStudy, list[PreparedCell], InjuryResults]):
     schema = InjuryStudy
 
     def plan(self, study: InjuryStudy, folder: ResultsFolder) -> list[PreparedCell]:
-        """Return the cells, each with its model and the values of every input.
-
-        Parameters
-        ----------
-        study : InjuryStudy
-            Checked study file.
-        folder : ResultsFolder
-            Results folder of the study.
-        """
+        """Return the cells, each with its model and the values of every input."""
         return [_prepare(study, cell, folder) for cell in cells_of(study)]
 
     def execute(
@@ -97,15 +89,7 @@ class Injury(StudyKind[InjuryStudy, list[PreparedCell], InjuryResults]):
         run_cells(study, folder, plan, workers=workers, quiet=quiet)
 
     def results(self, study: InjuryStudy, folder: ResultsFolder) -> InjuryResults:
-        """Return the cases of all cells and write them to the folder.
-
-        Parameters
-        ----------
-        study : InjuryStudy
-            Checked study file.
-        folder : ResultsFolder
-            Results folder of the study.
-        """
+        """Return the cases of all cells and write them to the folder."""
         model = load_study_model(study)
         functions = check_functions(study, model)
         frames = []
@@ -119,75 +103,27 @@ class Injury(StudyKind[InjuryStudy, list[PreparedCell], InjuryResults]):
         return InjuryResults(model, functions, cases, ended)
 
     def analyse(self, study: InjuryStudy, results: InjuryResults) -> dict[str, Any]:
-        """Return every number that the report prints.
-
-        Parameters
-        ----------
-        study : InjuryStudy
-            Checked study file.
-        results : InjuryResults
-            From ``results``.
-        """
+        """Return every number that the report prints."""
         found = analyse(study, results.model, results.cases, results.functions)
         return results.ended | found
 
-    def subtitle(
-        self, study: InjuryStudy, results: InjuryResults, analysis: Mapping[str, Any]
-    ) -> str:
-        """Return the line below the report's title.
-
-        Parameters
-        ----------
-        study : InjuryStudy
-            Checked study file.
-        results : InjuryResults
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        """
+    def subtitle(self, done: Finished[InjuryStudy, InjuryResults]) -> str:
+        """Return the line below the report's title."""
+        scenarios, fronts = (len(done.analysis[key]) for key in ("scenarios", "fronts"))
         return (
-            f"Injury study of {analysis['runs']:,} runs of the {study.model.name} model, "
-            f"{len(analysis['scenarios'])} scenario(s), {len(analysis['fronts'])} car front(s), "
-            f"seed {study.seed}"
+            f"Injury study of {done.analysis['runs']:,} runs of the {done.study.model.name} model, "
+            f"{scenarios} scenario(s), {fronts} car front(s), seed {done.study.seed}"
         )
 
-    def draw(
-        self, study: InjuryStudy, results: InjuryResults, analysis: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        """Return the figures by file name.
-
-        Parameters
-        ----------
-        study : InjuryStudy
-            Checked study file.
-        results : InjuryResults
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        """
-        return draw(study, results.cases, analysis, results.functions)
+    def draw(self, done: Finished[InjuryStudy, InjuryResults]) -> dict[str, Any]:
+        """Return the figures by file name."""
+        return draw(done.study, done.results.cases, done.analysis, done.results.functions)
 
     def sections(
-        self,
-        study: InjuryStudy,
-        results: InjuryResults,
-        analysis: Mapping[str, Any],
-        figures: Mapping[str, Any],
+        self, done: Finished[InjuryStudy, InjuryResults], figures: Mapping[str, Any]
     ) -> Sequence[Section]:
-        """Return the sections of the report.
-
-        Parameters
-        ----------
-        study : InjuryStudy
-            Checked study file.
-        results : InjuryResults
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        figures : mapping
-            From ``draw``: figures by file name.
-        """
-        return sections_of(study, analysis, figures, results.functions)
+        """Return the sections of the report."""
+        return sections_of(done.study, done.analysis, figures, done.results.functions)
 
     def summarise(self, analysis: Mapping[str, Any]) -> list[str]:
         """Return the risks of the scenarios."""

@@ -13,15 +13,14 @@ from mcstudy.studyfile.schema import (
     Design,
     Limits,
     ModelChoice,
-    StudyTable,
+    OutputReport,
     check_folder_name,
 )
 
 
-class ComparisonReport(StudyTable):
+class ComparisonReport(OutputReport):
     """``[report]`` of a comparison: outputs to compare, times at which nominal runs are drawn."""
 
-    outputs: Annotated[list[str], Field(min_length=1)] | None = None
     strip_times: Annotated[list[FiniteFloat], Field(min_length=1)] = STRIP_TIMES
 
 

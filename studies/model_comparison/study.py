@@ -18,7 +18,7 @@ from mcstudy.studyfile.identity import numbers_digest
 from mcstudy.studyfile.schema import Report
 from mcstudy.studyfile.study_outputs import check_outputs, report_outputs
 from models.protocol import Model, Run
-from studies.kind import StudyKind
+from studies.kind import Finished, StudyKind
 from studies.model_comparison.analysis import analyse, published_methods
 from studies.model_comparison.report import draw, sections_of, summarise
 from studies.model_comparison.schema import ModelComparison
@@ -56,15 +56,7 @@ class Comparison(StudyKind[ModelComparison, list[PreparedCell], ComparisonResult
     schema = ModelComparison
 
     def plan(self, study: ModelComparison, folder: ResultsFolder) -> list[PreparedCell]:
-        """Return the cells, each with its model and the values of every input.
-
-        Parameters
-        ----------
-        study : ModelComparison
-            Checked study file.
-        folder : ResultsFolder
-            Results folder of the study.
-        """
+        """Return the cells, each with its model and the values of every input."""
         cells = [_prepare(study, label, folder) for label in study.models]
         compared_outputs(study, {cell.name: cell.model for cell in cells})
         published_methods(study, cells[0].model)
@@ -100,15 +92,7 @@ class Comparison(StudyKind[ModelComparison, list[PreparedCell], ComparisonResult
             cell_folder(folder, cell.name).write_json(NOMINAL, poses)
 
     def results(self, study: ModelComparison, folder: ResultsFolder) -> ComparisonResults:
-        """Return models, runs and nominal runs.
-
-        Parameters
-        ----------
-        study : ModelComparison
-            Checked study file.
-        folder : ResultsFolder
-            Results folder of the study.
-        """
+        """Return models, runs and nominal runs."""
         models = {label: load_study_model(cell_study(study, label)) for label in study.models}
         return ComparisonResults(
             models,
@@ -120,75 +104,29 @@ class Comparison(StudyKind[ModelComparison, list[PreparedCell], ComparisonResult
         )
 
     def analyse(self, study: ModelComparison, results: ComparisonResults) -> dict[str, Any]:
-        """Return every number that the report prints.
-
-        Parameters
-        ----------
-        study : ModelComparison
-            Checked study file.
-        results : ComparisonResults
-            From ``results``.
-        """
+        """Return every number that the report prints."""
         outputs = compared_outputs(study, results.models)
         return analyse(study, results.models, results.runs, results.nominal, outputs)
 
-    def subtitle(
-        self, study: ModelComparison, results: ComparisonResults, analysis: Mapping[str, Any]
-    ) -> str:
-        """Return the line below the report's title.
-
-        Parameters
-        ----------
-        study : ModelComparison
-            Checked study file.
-        results : ComparisonResults
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        """
-        named = ", ".join(f"{label} ({model.name})" for label, model in results.models.items())
+    def subtitle(self, done: Finished[ModelComparison, ComparisonResults]) -> str:
+        """Return the line below the report's title."""
+        named = ", ".join(f"{label} ({model.name})" for label, model in done.results.models.items())
         return (
-            f"{study.design.n:,} sets of inputs through {len(results.models)} models: {named}, "
-            f"seed {study.seed}"
+            f"{done.study.design.n:,} sets of inputs through {len(done.results.models)} models: "
+            f"{named}, seed {done.study.seed}"
         )
 
-    def draw(
-        self, study: ModelComparison, results: ComparisonResults, analysis: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        """Return the figures by file name.
-
-        Parameters
-        ----------
-        study : ModelComparison
-            Checked study file.
-        results : ComparisonResults
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        """
-        return draw(study, results.models, results.runs, results.nominal, analysis)
+    def draw(self, done: Finished[ModelComparison, ComparisonResults]) -> dict[str, Any]:
+        """Return the figures by file name."""
+        return draw(
+            done.study, done.results.models, done.results.runs, done.results.nominal, done.analysis
+        )
 
     def sections(
-        self,
-        study: ModelComparison,
-        results: ComparisonResults,
-        analysis: Mapping[str, Any],
-        figures: Mapping[str, Any],
+        self, done: Finished[ModelComparison, ComparisonResults], figures: Mapping[str, Any]
     ) -> Sequence[Section]:
-        """Return the sections of the report.
-
-        Parameters
-        ----------
-        study : ModelComparison
-            Checked study file.
-        results : ComparisonResults
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        figures : mapping
-            From ``draw``: figures by file name.
-        """
-        return sections_of(study, results.models, analysis, figures)
+        """Return the sections of the report."""
+        return sections_of(done.study, done.results.models, done.analysis, figures)
 
     def summarise(self, analysis: Mapping[str, Any]) -> list[str]:
         """Return the agreement of the models."""

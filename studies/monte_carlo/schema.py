@@ -12,11 +12,6 @@ class MonteCarloStudy(SampledStudy):
     design: Design = Design()
     report: Report = Report()
 
-    @property
-    def reported(self) -> list[str] | None:
-        """Outputs that the study names for its report, if it names any."""
-        return self.report.outputs
-
     def design_topics(self) -> dict[str, Any]:
         """Return the parts of the design that affect the values of a run, by topic."""
         return {

@@ -16,7 +16,7 @@ from mcstudy.studyfile.identity import numbers_digest
 from mcstudy.studyfile.study_outputs import check_outputs, report_outputs
 from models.protocol import Model, complete_status
 from studies.failure_report import failure_map
-from studies.kind import StudyKind
+from studies.kind import Finished, StudyKind
 from studies.monte_carlo.design import sample_inputs
 from studies.monte_carlo.report import sections_of, summarise
 from studies.monte_carlo.schema import MonteCarloStudy
@@ -29,15 +29,7 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns]):
     schema = MonteCarloStudy
 
     def plan(self, study: MonteCarloStudy, folder: ResultsFolder) -> RunPlan:
-        """Return the model and the sampled values of its inputs.
-
-        Parameters
-        ----------
-        study : MonteCarloStudy
-            Checked study file.
-        folder : ResultsFolder
-            Results folder of the study.
-        """
+        """Return the model and the sampled values of its inputs."""
         model = load_study_model(study)
         report_outputs(study, model)
         marks_of(study, model)
@@ -78,102 +70,41 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns]):
         _keep_histories(study, plan.model, runs, folder)
 
     def results(self, study: MonteCarloStudy, folder: ResultsFolder) -> ModelRuns:
-        """Return the model and the runs of the design.
-
-        Parameters
-        ----------
-        study : MonteCarloStudy
-            Checked study file.
-        folder : ResultsFolder
-            Results folder of the study.
-        """
+        """Return the model and the runs of the design."""
         model = load_study_model(study)
         runs = folder.runs(columns_of(model))
         return ModelRuns(model, runs[runs["run"] < study.design.n])
 
     def analyse(self, study: MonteCarloStudy, results: ModelRuns) -> dict[str, Any]:
-        """Return every number that the report prints.
-
-        Parameters
-        ----------
-        study : MonteCarloStudy
-            Checked study file.
-        results : ModelRuns
-            From ``results``.
-        """
+        """Return every number that the report prints."""
         return analyse(study, results.model, results.runs)
 
-    def subtitle(
-        self, study: MonteCarloStudy, results: ModelRuns, analysis: Mapping[str, Any]
-    ) -> str:
-        """Return the line below the report's title.
-
-        Parameters
-        ----------
-        study : MonteCarloStudy
-            Checked study file.
-        results : ModelRuns
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        """
+    def subtitle(self, done: Finished[MonteCarloStudy, ModelRuns]) -> str:
+        """Return the line below the report's title."""
         return (
-            f"Monte Carlo study of {len(results.runs):,} runs of the {results.model.name} model, "
-            f"{study.design.method} design, seed {study.seed}"
+            f"Monte Carlo study of {len(done.results.runs):,} runs of the "
+            f"{done.results.model.name} model, {done.study.design.method} design, "
+            f"seed {done.study.seed}"
         )
 
-    def draw(
-        self, study: MonteCarloStudy, results: ModelRuns, analysis: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        """Return the figures by file name.
-
-        Parameters
-        ----------
-        study : MonteCarloStudy
-            Checked study file.
-        results : ModelRuns
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        """
-        return draw(study, results.model, results.runs, analysis)
+    def draw(self, done: Finished[MonteCarloStudy, ModelRuns]) -> dict[str, Any]:
+        """Return the figures by file name."""
+        return draw(done.study, done.results.model, done.results.runs, done.analysis)
 
     def sections(
-        self,
-        study: MonteCarloStudy,
-        results: ModelRuns,
-        analysis: Mapping[str, Any],
-        figures: Mapping[str, Any],
+        self, done: Finished[MonteCarloStudy, ModelRuns], figures: Mapping[str, Any]
     ) -> Sequence[Section]:
-        """Return the sections of the report.
-
-        Parameters
-        ----------
-        study : MonteCarloStudy
-            Checked study file.
-        results : ModelRuns
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        figures : mapping
-            From ``draw``: figures by file name.
-        """
-        return sections_of(study, results.model, results.runs, analysis, figures)
+        """Return the sections of the report."""
+        return sections_of(
+            done.study, done.results.model, done.results.runs, done.analysis, figures
+        )
 
     def summarise(self, analysis: Mapping[str, Any]) -> list[Table]:
         """Return the distributions of the reported outputs."""
         return summarise(analysis)
 
     def independent_rows(self, runs: pd.DataFrame, folder: ResultsFolder) -> pd.DataFrame:
-        """Return all runs: each is an independent draw.
-
-        Parameters
-        ----------
-        runs : DataFrame
-            One row a run.
-        folder : ResultsFolder
-            Results folder of the study.
-        """
+        """Return all runs: each is an independent draw."""
         return runs
 
 

@@ -28,11 +28,6 @@ class MorrisStudy(FactorStudy):
     design: MorrisDesign = MorrisDesign()
     report: FactorReport = FactorReport()
 
-    @property
-    def reported(self) -> list[str] | None:
-        """Outputs that the study names for its report, if it names any."""
-        return self.report.outputs
-
     def design_topics(self) -> dict[str, Any]:
         """Return the parts of the design that affect the values of a run, by topic."""
         levels = {"design.levels": self.design.levels, "design.grid": "shifted"}

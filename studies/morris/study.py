@@ -3,7 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.results import ResultsFolder
@@ -14,48 +16,32 @@ from mcstudy.sampling.morris import draw_trajectories
 from mcstudy.sensitivity.blocks import is_enough, whole_blocks
 from mcstudy.sensitivity.morris import ElementaryEffects, estimate_effects
 from mcstudy.statistics import Estimate
-from mcstudy.studyfile.identity import numbers_digest
-from mcstudy.studyfile.study_inputs import check_independent, map_inputs
 from mcstudy.studyfile.study_outputs import report_outputs
 from models.protocol import Model
-from studies.kind import StudyKind
+from studies.factor_kind import FactorKind
+from studies.kind import Finished
 from studies.morris.report import draw, sections_of, summarise
 from studies.morris.schema import MorrisStudy
 from studies.runs import (
     ModelRuns,
     RunPlan,
     check_failure_rate,
-    complete_blocks,
-    load_study_model,
     run_rows,
 )
 
 
-class Morris(StudyKind[MorrisStudy, RunPlan, ModelRuns]):
+class Morris(FactorKind[MorrisStudy]):
     """Trajectories that change one factor of one model after the other."""
 
     schema = MorrisStudy
 
-    def plan(self, study: MorrisStudy, folder: ResultsFolder) -> RunPlan:
-        """Return the model and the values of its inputs along all trajectories.
-
-        Parameters
-        ----------
-        study : MorrisStudy
-            Checked study file.
-        folder : ResultsFolder
-            Results folder of the study.
-        """
-        model = load_study_model(study)
-        report_outputs(study, model)
-        check_independent(study)
+    def design(self, study: MorrisStudy) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return the design and the independent part of each row."""
         design = study.design
         drawn = draw_trajectories(
             list(study.inputs), study.groups, design.n, design.levels, study.seed
         )
-        columns = map_inputs(study, model, drawn.uniforms)
-        folder.check_same_study(numbers_digest(study, model))
-        return RunPlan(model, columns, drawn.trajectory)
+        return drawn.uniforms, drawn.trajectory
 
     def execute(
         self,
@@ -89,100 +75,34 @@ class Morris(StudyKind[MorrisStudy, RunPlan, ModelRuns]):
             replicate=plan.replicate, workers=workers, quiet=quiet,
         )  # fmt: skip
 
-    def results(self, study: MorrisStudy, folder: ResultsFolder) -> ModelRuns:
-        """Return the model and the runs of the trajectories that are whole.
-
-        Parameters
-        ----------
-        study : MorrisStudy
-            Checked study file.
-        folder : ResultsFolder
-            Results folder of the study.
-        """
-        model = load_study_model(study)
-        return ModelRuns(model, complete_blocks(folder, model))
-
     def analyse(self, study: MorrisStudy, results: ModelRuns) -> dict[str, Any]:
-        """Return every number that the report prints.
-
-        Parameters
-        ----------
-        study : MorrisStudy
-            Checked study file.
-        results : ModelRuns
-            From ``results``.
-        """
+        """Return every number that the report prints."""
         return analyse(study, results.model, results.runs)
 
-    def subtitle(self, study: MorrisStudy, results: ModelRuns, analysis: Mapping[str, Any]) -> str:
-        """Return the line below the report's title.
-
-        Parameters
-        ----------
-        study : MorrisStudy
-            Checked study file.
-        results : ModelRuns
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        """
+    def subtitle(self, done: Finished[MorrisStudy, ModelRuns]) -> str:
+        """Return the line below the report's title."""
         return (
-            f"Morris screening by {len(results.runs):,} runs of the {results.model.name} model: "
-            f"{analysis['trajectories']:,} trajectories, seed {study.seed}"
+            f"Morris screening by {len(done.results.runs):,} runs of the "
+            f"{done.results.model.name} model: {done.analysis['trajectories']:,} trajectories, "
+            f"seed {done.study.seed}"
         )
 
-    def draw(
-        self, study: MorrisStudy, results: ModelRuns, analysis: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        """Return the figures by file name.
-
-        Parameters
-        ----------
-        study : MorrisStudy
-            Checked study file.
-        results : ModelRuns
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        """
-        return draw(analysis)
+    def draw(self, done: Finished[MorrisStudy, ModelRuns]) -> dict[str, Any]:
+        """Return the figures by file name."""
+        return draw(done.analysis)
 
     def sections(
-        self,
-        study: MorrisStudy,
-        results: ModelRuns,
-        analysis: Mapping[str, Any],
-        figures: Mapping[str, Any],
+        self, done: Finished[MorrisStudy, ModelRuns], figures: Mapping[str, Any]
     ) -> Sequence[Section]:
-        """Return the sections of the report.
-
-        Parameters
-        ----------
-        study : MorrisStudy
-            Checked study file.
-        results : ModelRuns
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        figures : mapping
-            From ``draw``: figures by file name.
-        """
-        return sections_of(study, results.model, analysis, figures)
+        """Return the sections of the report."""
+        return sections_of(done.study, done.results.model, done.analysis, figures)
 
     def summarise(self, analysis: Mapping[str, Any]) -> list[str]:
         """Return the influential factors of the reported outputs."""
         return summarise(analysis)
 
     def independent_rows(self, runs: pd.DataFrame, folder: ResultsFolder) -> pd.DataFrame:
-        """Refuse: trajectories are no sample of the inputs.
-
-        Parameters
-        ----------
-        runs : DataFrame
-            One row a run.
-        folder : ResultsFolder
-            Results folder of the study.
-        """
+        """Refuse: trajectories are no sample of the inputs."""
         raise UserError(
             f"{folder.path}: trajectories of a Morris study are no sample of its inputs; its own "
             "report ranks them"

@@ -31,11 +31,6 @@ class SobolStudy(FactorStudy):
     design: SaltelliDesign = SaltelliDesign()
     report: FactorReport = FactorReport()
 
-    @property
-    def reported(self) -> list[str] | None:
-        """Outputs that the study names for its report, if it names any."""
-        return self.report.outputs
-
     def design_topics(self) -> dict[str, Any]:
         """Return the parts of the design that affect the values of a run, by topic."""
         return super().design_topics() | {"design.second_order": self.design.second_order}

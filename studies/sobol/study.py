@@ -4,7 +4,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from mcstudy.execution.progress import say
 from mcstudy.execution.results import ResultsFolder
@@ -12,17 +14,15 @@ from mcstudy.execution.workers import Workers
 from mcstudy.report import Section
 from mcstudy.sampling.factors import factors_of
 from mcstudy.sampling.saltelli import block_size, draw_saltelli, is_base_row
-from mcstudy.studyfile.identity import numbers_digest
-from mcstudy.studyfile.study_inputs import check_independent, map_inputs
-from mcstudy.studyfile.study_outputs import report_outputs
-from studies.kind import StudyKind
-from studies.runs import ModelRuns, RunPlan, complete_blocks, load_study_model, run_rows
+from studies.factor_kind import FactorKind
+from studies.kind import Finished
+from studies.runs import ModelRuns, RunPlan, run_rows
 from studies.sobol.analysis import analyse, widest_interval
 from studies.sobol.report import draw, sections_of, summarise
 from studies.sobol.schema import SobolStudy
 
 
-class Sobol(StudyKind[SobolStudy, RunPlan, ModelRuns]):
+class Sobol(FactorKind[SobolStudy]):
     """Saltelli's design of one model, doubled until the indices are accurate enough.
 
     It doubles from ``design.start`` base points until the widest interval of a total index of the
@@ -32,26 +32,13 @@ class Sobol(StudyKind[SobolStudy, RunPlan, ModelRuns]):
 
     schema = SobolStudy
 
-    def plan(self, study: SobolStudy, folder: ResultsFolder) -> RunPlan:
-        """Return the model and the values of its inputs over the whole design.
-
-        Parameters
-        ----------
-        study : SobolStudy
-            Checked study file.
-        folder : ResultsFolder
-            Results folder of the study.
-        """
-        model = load_study_model(study)
-        report_outputs(study, model)
-        check_independent(study)
+    def design(self, study: SobolStudy) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return the design and the independent part of each row."""
         design = study.design
         drawn = draw_saltelli(
             list(study.inputs), study.groups, design.n, study.seed, second_order=design.second_order
         )
-        columns = map_inputs(study, model, drawn.uniforms)
-        folder.check_same_study(numbers_digest(study, model))
-        return RunPlan(model, columns, drawn.scramble)
+        return drawn.uniforms, drawn.scramble
 
     def execute(
         self,
@@ -98,98 +85,32 @@ class Sobol(StudyKind[SobolStudy, RunPlan, ModelRuns]):
                 return
             n *= 2
 
-    def results(self, study: SobolStudy, folder: ResultsFolder) -> ModelRuns:
-        """Return the model and the runs of the base points that are whole.
-
-        Parameters
-        ----------
-        study : SobolStudy
-            Checked study file.
-        folder : ResultsFolder
-            Results folder of the study.
-        """
-        model = load_study_model(study)
-        return ModelRuns(model, complete_blocks(folder, model))
-
     def analyse(self, study: SobolStudy, results: ModelRuns) -> dict[str, Any]:
-        """Return every number that the report prints.
-
-        Parameters
-        ----------
-        study : SobolStudy
-            Checked study file.
-        results : ModelRuns
-            From ``results``.
-        """
+        """Return every number that the report prints."""
         return analyse(study, results.model, results.runs)
 
-    def subtitle(self, study: SobolStudy, results: ModelRuns, analysis: Mapping[str, Any]) -> str:
-        """Return the line below the report's title.
-
-        Parameters
-        ----------
-        study : SobolStudy
-            Checked study file.
-        results : ModelRuns
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        """
+    def subtitle(self, done: Finished[SobolStudy, ModelRuns]) -> str:
+        """Return the line below the report's title."""
         return (
-            f"Sobol' study of {len(results.runs):,} runs of the {results.model.name} model: "
-            f"{analysis['base_points']:,} base points, seed {study.seed}"
+            f"Sobol' study of {len(done.results.runs):,} runs of the "
+            f"{done.results.model.name} model: {done.analysis['base_points']:,} base points, "
+            f"seed {done.study.seed}"
         )
 
-    def draw(
-        self, study: SobolStudy, results: ModelRuns, analysis: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        """Return the figures by file name.
-
-        Parameters
-        ----------
-        study : SobolStudy
-            Checked study file.
-        results : ModelRuns
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        """
-        return draw(analysis)
+    def draw(self, done: Finished[SobolStudy, ModelRuns]) -> dict[str, Any]:
+        """Return the figures by file name."""
+        return draw(done.analysis)
 
     def sections(
-        self,
-        study: SobolStudy,
-        results: ModelRuns,
-        analysis: Mapping[str, Any],
-        figures: Mapping[str, Any],
+        self, done: Finished[SobolStudy, ModelRuns], figures: Mapping[str, Any]
     ) -> Sequence[Section]:
-        """Return the sections of the report.
-
-        Parameters
-        ----------
-        study : SobolStudy
-            Checked study file.
-        results : ModelRuns
-            From ``results``.
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        figures : mapping
-            From ``draw``: figures by file name.
-        """
-        return sections_of(study, results.model, analysis, figures)
+        """Return the sections of the report."""
+        return sections_of(done.study, done.results.model, done.analysis, figures)
 
     def summarise(self, analysis: Mapping[str, Any]) -> list[str]:
         """Return the influential factors of the reported outputs."""
         return summarise(analysis)
 
     def independent_rows(self, runs: pd.DataFrame, folder: ResultsFolder) -> pd.DataFrame:
-        """Return the rows of Saltelli's matrices A and B.
-
-        Parameters
-        ----------
-        runs : DataFrame
-            One row a run.
-        folder : ResultsFolder
-            Results folder of the study.
-        """
+        """Return the rows of Saltelli's matrices A and B."""
         return runs[is_base_row(runs["run"].to_numpy(), folder.design()["block"])]

@@ -29,12 +29,12 @@ class Wall(NamedTuple):
 
 
 @inlined_kernel
-def one(wall):  # type: ignore[no-untyped-def]
+def one(wall):
     return 1
 
 
 @inlined_kernel
-def wall_separation(wall, ellipsoids, contacts, patch, i, cx, cy, cz, cosine, sine):  # type: ignore[no-untyped-def]
+def wall_separation(wall, ellipsoids, contacts, patch, i, cx, cy, cz, cosine, sine):
     n = wall.normal
     A = shape_of(contacts, i)
     ax = A[0] * n[0] + A[1] * n[1] + A[2] * n[2]
@@ -55,7 +55,7 @@ def wall() -> Iterator[Wall]:
 
 
 @numba.njit
-def nearest(front, ellipsoids, contacts):  # type: ignore[no-untyped-def]
+def nearest(front, ellipsoids, contacts):
     """Return the segment that is nearest to a front, and the nine answers of the front."""
     best, found = -1, separation_of(front, ellipsoids, contacts, 0, 0, 9.0, 9.0, 9.0, 1.0, 0.0)
     for i in range(contacts.centre.shape[0]):

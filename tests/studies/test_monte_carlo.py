@@ -8,6 +8,7 @@ from headform_studies import run_text, study_text, without_figures
 
 from mcstudy.execution.results import ResultsFolder
 from models.registry import load_model
+from studies.kind import Finished
 from studies.kinds import load_study
 from studies.monte_carlo.schema import MonteCarloStudy
 from studies.monte_carlo.study import MonteCarlo
@@ -51,9 +52,11 @@ def test_every_figure_is_made(folder: ResultsFolder) -> None:
     study, kind = load_study(folder.path / "study.toml"), MonteCarlo()
     assert isinstance(study, MonteCarloStudy)
     runs, analysis = kind.results(study, folder), folder.read_json("analysis.json")
-    figures = kind.draw(study, runs, analysis)
+    figures = kind.draw(Finished(study, runs, analysis))
     assert {"impact_speed", "throw_and_wad"} <= set(figures)
-    shown = [f for part in kind.sections(study, runs, analysis, figures) for f in part.figures]
+    shown = [
+        f for part in kind.sections(Finished(study, runs, analysis), figures) for f in part.figures
+    ]
     assert len(shown) >= len(figures)
 
 

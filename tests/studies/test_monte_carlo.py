@@ -52,10 +52,11 @@ def test_every_figure_is_made(folder: ResultsFolder) -> None:
     study, kind = load_study(folder.path / "study.toml"), MonteCarlo()
     assert isinstance(study, MonteCarloStudy)
     runs, analysis = kind.results(study, folder), folder.read_json("analysis.json")
-    figures = kind.draw(Finished(study, runs, analysis))
+    done = Finished(study, runs, analysis)
+    figures = kind.draw(done)
     assert {"impact_speed", "throw_and_wad"} <= set(figures)
     shown = [
-        f for part in kind.sections(Finished(study, runs, analysis), figures) for f in part.figures
+        f for part in kind.sections(done, figures) for f in part.figures
     ]
     assert len(shown) >= len(figures)
 

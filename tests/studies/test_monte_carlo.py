@@ -55,9 +55,7 @@ def test_every_figure_is_made(folder: ResultsFolder) -> None:
     done = Finished(study, runs, analysis)
     figures = kind.draw(done)
     assert {"impact_speed", "throw_and_wad"} <= set(figures)
-    shown = [
-        f for part in kind.sections(done, figures) for f in part.figures
-    ]
+    shown = [f for part in kind.sections(done, figures) for f in part.figures]
     assert len(shown) >= len(figures)
 
 

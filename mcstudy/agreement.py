@@ -5,7 +5,7 @@ inputs, and the variance of an output splits exactly into three shares: the meth
 alone, and their interaction.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from scipy import stats
 
 from mcstudy.sampling import seeds
 from mcstudy.statistics import REACH, ROUNDING, Estimate, between_replicates, scale_of, varies
+from mcstudy.typed_json import Real
 
 Array = NDArray[np.float64]
 Parts = NDArray[np.int64]
@@ -49,7 +50,7 @@ class Agreement:
     spread: Estimate
     lower: Estimate
     upper: Estimate
-    outside: float
+    outside: Real
     slope: Estimate
 
 
@@ -70,7 +71,21 @@ class VarianceSplit:
     method: Estimate
     inputs: Estimate
     together: Estimate
-    total: float
+    total: Real
+
+
+@dataclass(frozen=True)
+class Sources:
+    """Sources of disagreement.
+
+    Attributes
+    ----------
+    gains : gain in rank correlation without the disagreement along each input, by input.
+    noise : largest gain of unrelated dummies.
+    """
+
+    gains: Mapping[str, Real]
+    noise: Real
 
 
 def without_rounding(reference: Array, method: Array) -> Array:

@@ -6,12 +6,16 @@ spread of the estimate between independent replicates (Student's t).
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 from scipy import stats
+
+from mcstudy.typed_json import Real
 
 Array = NDArray[np.float64]
 
@@ -26,17 +30,55 @@ ROUNDING = 1e-12
 class Estimate:
     """A value with its confidence interval; ``low`` and ``high`` are NaN where none exists."""
 
-    value: float
-    low: float
-    high: float
+    value: Real
+    low: Real
+    high: Real
 
-    def as_dict(self) -> dict[str, float]:
-        """Return the three numbers by name."""
-        return asdict(self)
+    @property
+    def has_interval(self) -> bool:
+        """Whether both ends of the interval exist."""
+        return math.isfinite(self.low) and math.isfinite(self.high)
 
     def times(self, factor: float) -> "Estimate":
         """Return the estimate multiplied by a factor."""
         return Estimate(factor * self.value, factor * self.low, factor * self.high)
+
+
+@dataclass(frozen=True)
+class TooFew:
+    """An output with fewer than two values.
+
+    Attributes
+    ----------
+    unit : unit of the values.
+    n : number of values.
+    undefined : number of runs without a value.
+    """
+
+    unit: str
+    n: int
+    undefined: int
+
+
+@dataclass(frozen=True)
+class Distribution(TooFew):
+    """An output's distribution: mean, standard deviation and quantiles by probability."""
+
+    mean: Estimate
+    sd: Estimate
+    quantiles: Mapping[str, Estimate]
+
+
+Described = Annotated[Distribution | TooFew, Field(union_mode="left_to_right")]
+"""What ``describe`` gives."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """An estimate on the first n values."""
+
+    n: int
+    value: Real
 
 
 def varies(values: Array) -> bool:
@@ -47,6 +89,11 @@ def varies(values: Array) -> bool:
     low, high = float(part.min()), float(part.max())
     # Halves: the difference of the largest numbers would overflow.
     return 0.5 * high - 0.5 * low > 0.5 * ROUNDING * max(abs(low), abs(high))
+
+
+def by_size(values: Mapping[str, float]) -> list[str]:
+    """Return the names of values, the largest first; NaN counts as zero."""
+    return sorted(values, key=lambda name: -np.nan_to_num(values[name]))
 
 
 def scale_of(values: Array) -> float:
@@ -136,37 +183,46 @@ def probability(hits: NDArray[np.bool_], replicate: NDArray[np.int64] | None = N
     return Estimate(found.value, max(found.low, 0.0), min(found.high, 1.0))
 
 
-def describe(values: Array, replicate: NDArray[np.int64] | None = None) -> dict[str, object]:
+def describe(
+    values: Array, unit: str = "1", replicate: NDArray[np.int64] | None = None
+) -> Distribution | TooFew:
     """Return mean, standard deviation and quantiles of the finite values, with intervals.
 
     Values that do not vary have a standard deviation of zero, and no interval.
+
+    Parameters
+    ----------
+    values : (n,) array
+        NaN where undefined.
+    unit : str
+        Of the values.
+    replicate : (n,) array of int or None
+        Replicate of each sample; None if the samples are independent.
     """
     finite = np.isfinite(values)
     part = values[finite]
     groups = None if replicate is None else replicate[finite]
-    counts: dict[str, object] = {"n": int(part.size), "undefined": int((~finite).sum())}
-    if part.size < 2:
-        return counts
+    size, undefined = int(part.size), int((~finite).sum())
+    if size < 2:
+        return TooFew(unit, size, undefined)
     chosen = (0.05, 0.25, 0.5, 0.75, 0.95)
     if not varies(part):
-        one = Estimate(float(part[0]), np.nan, np.nan).as_dict()
-        nothing = Estimate(0.0, np.nan, np.nan).as_dict()
-        quantiles = {f"{p:g}": one for p in chosen}
-        return counts | {"mean": one, "sd": nothing, "quantiles": quantiles}
+        one, nothing = Estimate(float(part[0]), np.nan, np.nan), Estimate(0.0, np.nan, np.nan)
+        return Distribution(unit, size, undefined, one, nothing, {f"{p:g}": one for p in chosen})
     scale = scale_of(part)
     part = part / scale
-    return counts | {
-        "mean": mean(part, groups).times(scale).as_dict(),
-        "sd": standard_deviation(part, groups).times(scale).as_dict(),
-        "quantiles": {f"{p:g}": quantile(part, p, groups).times(scale).as_dict() for p in chosen},
-    }
+    return Distribution(
+        unit, size, undefined, mean(part, groups).times(scale),
+        standard_deviation(part, groups).times(scale),
+        {f"{p:g}": quantile(part, p, groups).times(scale) for p in chosen},
+    )  # fmt: skip
 
 
-def convergence(values: Array, estimator: Callable[[Array], float]) -> list[dict[str, float]]:
+def convergence(values: Array, estimator: Callable[[Array], float]) -> list[Step]:
     """Return the estimator on the first n/8, n/4, n/2 and n values."""
     finite = values[np.isfinite(values)]
     sizes = [finite.size // k for k in (8, 4, 2, 1)]
-    return [{"n": size, "value": estimator(finite[:size])} for size in sizes if size >= 8]
+    return [Step(size, estimator(finite[:size])) for size in sizes if size >= 8]
 
 
 def between_replicates(estimates: Array, pooled: float) -> Estimate:

@@ -1,7 +1,8 @@
 """Numbers formatted for reports."""
 
 import math
-from collections.abc import Mapping
+
+from mcstudy.statistics import Estimate
 
 SMALL, LARGE = 1e-9, 1e9
 _UNITS = {"1": "", "m/s2": "m/s²", "rad/s2": "rad/s²"}
@@ -48,29 +49,26 @@ def quantity(value: float | None, name: str, digits: int = 3) -> str:
     return f"{number(value, digits)} {unit(name)}".strip()
 
 
-def interval(estimate: Mapping[str, float | None], digits: int = 3) -> str:
+def interval(estimate: Estimate, digits: int = 3) -> str:
     """Return ``value (low to high)`` of an estimate."""
-    low, high = estimate["low"], estimate["high"]
-    if low is None or high is None or not (math.isfinite(low) and math.isfinite(high)):
-        return number(estimate["value"], digits)
-    return f"{number(estimate['value'], digits)} ({number(low, digits)} to {number(high, digits)})"
+    value, low, high = (number(v, digits) for v in (estimate.value, estimate.low, estimate.high))
+    return f"{value} ({low} to {high})" if estimate.has_interval else value
 
 
-def share(estimate: Mapping[str, float | None]) -> str:
+def share(estimate: Estimate) -> str:
     """Return ``value (low to high)`` of a share, with two decimals."""
-    shown = [estimate[key] for key in ("value", "low", "high")]
     value, low, high = (
-        "–" if v is None or not math.isfinite(v) else f"{v:.2f}".replace("-0.00", "0.00")
-        for v in shown
+        f"{v:.2f}".replace("-0.00", "0.00") if math.isfinite(v) else "–"
+        for v in (estimate.value, estimate.low, estimate.high)
     )
-    return value if "–" in (low, high) else f"{value} ({low} to {high})"
+    return f"{value} ({low} to {high})" if estimate.has_interval else value
 
 
-def percent(estimate: Mapping[str, float | None]) -> str:
+def percent(estimate: Estimate) -> str:
     """Return a probability with its interval in per cent."""
-    value, low, high = (estimate[k] for k in ("value", "low", "high"))
-    if value is None or not math.isfinite(value):
+    value, low, high = (100.0 * v for v in (estimate.value, estimate.low, estimate.high))
+    if not math.isfinite(value):
         return "–"
-    if low is None or high is None or not (math.isfinite(low) and math.isfinite(high)):
-        return f"{100.0 * value:.1f} %"
-    return f"{100.0 * value:.1f} % ({100.0 * low:.1f} to {100.0 * high:.1f} %)"
+    return (
+        f"{value:.1f} % ({low:.1f} to {high:.1f} %)" if estimate.has_interval else f"{value:.1f} %"
+    )

@@ -19,10 +19,12 @@ from mcstudy.files import read_study_text
 from mcstudy.injury.cases import read_parquet
 from mcstudy.report import Section, Table
 from mcstudy.text import percent
+from mcstudy.typed_json import from_plain
 from studies.diagnosis import extension, words
 from studies.diagnosis.report import summarise
 from studies.diagnosis.study import diagnose
 from studies.injury.analysis import CASES
+from studies.injury.numbers import ScenarioOutcome
 from studies.injury.schema import InjuryStudy
 from studies.injury.study import Injury
 from studies.kinds import parse_study
@@ -74,7 +76,9 @@ def run_demo(
         assert isinstance(study, InjuryStudy)
         say(f"injury study, {TITLES[name]}")
         found = Injury().run(study, content, ResultsFolder(out / f"injury_{name}"), workers=workers)
-        injuries[name] = found["scenarios"]["reference"] | {"limit": study.limit.value}
+        injuries[name] = {
+            "outcome": found.scenarios["reference"], "limit": study.limit.value
+        }  # fmt: skip
     folder = ResultsFolder(out)
     with folder.open_for_writing():
         return publish(
@@ -93,7 +97,9 @@ def _draw(analysis: Mapping[str, Any], out: Path) -> dict[str, Any]:
             pictures["pictures"]["signals"]["head_acceleration"], label
         ),
         "evidence": figures_of.draw_evidence(analysis["answer"]["effects"]),
-        "ais": risk.draw_ais({TITLES[k]: v["ais"] for k, v in analysis["injuries"].items()}),
+        "ais": risk.draw_ais(
+            {TITLES[k]: v["outcome"]["ais"] for k, v in analysis["injuries"].items()}
+        ),
     }
     values = {
         TITLES[name]: read_parquet(out / f"injury_{name}" / CASES)["hic15"].to_numpy(float)
@@ -108,7 +114,8 @@ def _sections(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list[S
     hidden = analysis["hidden"]
     rows = []
     for name, found in analysis["injuries"].items():
-        above, injured = found["above_limit"], found["at_least"]["3"]
+        outcome = from_plain(ScenarioOutcome, found["outcome"])
+        above, injured = outcome.above_limit, outcome.at_least["3"]
         rows.append([TITLES[name], percent(above), percent(injured)])
     return [
         Section(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from mcstudy.execution.results import ResultsFolder
 from studies.api import run_case, run_study
-from studies.stiffness import fit_stiffness_of
+from studies.stiffness_fit.study import fit_stiffness_of
 from studies.validation.report import validate
 
 GALLERY = Path("results/gallery")

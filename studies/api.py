@@ -8,12 +8,11 @@ Examples
 >>> head = rerun(results, run=17).histories["head"]                 # doctest: +SKIP
 """
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from mcstudy.errors import UserError
-from mcstudy.execution.results import ResultsFolder
+from mcstudy.execution.results import ANALYSIS, ResultsFolder
 from mcstudy.execution.workers import Workers
 from mcstudy.files import read_study_text
 from mcstudy.report import Table
@@ -83,19 +82,16 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
     study = load_study(folder.path / "study.toml")
     if study.kind not in KINDS:
         raise UserError(f"{folder.path}: a {study.kind} is drawn again by 'mcstudy reconstruct'")
-    analysis: dict[str, Any] = KINDS[study.kind].build_report(study, folder)
-    return analysis
+    KINDS[study.kind].build_report(study, folder)
+    return folder.read_json(ANALYSIS)
 
 
-def summarise(folder: ResultsFolder, analysis: Mapping[str, Any]) -> list[str | Table]:
+def summarise(folder: ResultsFolder) -> list[str | Table]:
     """Return the analysis of a study's folder in a few paragraphs and tables."""
-    kind = load_study(folder.path / "study.toml").kind
-    return [*KINDS[kind].summarise(analysis), _counted(analysis)]
-
-
-def _counted(analysis: Mapping[str, Any]) -> str:
-    counts = ", ".join(f"{n} {status}" for status, n in analysis["status"].items())
-    return f"{analysis['runs']} runs: {counts}"
+    kind = KINDS[load_study(folder.path / "study.toml").kind]
+    analysis = folder.read_analysis(kind.analysis)
+    counts = ", ".join(f"{n} {status}" for status, n in analysis.status.items())
+    return [*kind.summarise(analysis), f"{analysis.runs} runs: {counts}"]
 
 
 def run_case(

@@ -72,7 +72,7 @@ def run(
     where = workers if cluster is None else cluster
     folder = api.run_study(study, out=out, workers=where, quiet=quiet or as_json)
     analysis = folder.read_json("analysis.json")
-    summary = api.summarise(folder, analysis)
+    summary = api.summarise(folder)
     _print_analysis(analysis, summary, folder.path, quiet=quiet, as_json=as_json)
 
 
@@ -101,7 +101,7 @@ def report(folder: Folder, quiet: Quiet = False, as_json: Json = False) -> None:
 
     results = ResultsFolder(folder)
     analysis = api.build_report(results)
-    summary = api.summarise(results, analysis)
+    summary = api.summarise(results)
     _print_analysis(analysis, summary, folder, quiet=quiet, as_json=as_json)
 
 
@@ -147,14 +147,15 @@ def fit_stiffness(
 ) -> None:
     """Fit force-penetration curves to headform tests and build their stiffness corridor."""
     from mcstudy.execution.results import ResultsFolder
-    from studies import stiffness
+    from studies.stiffness_fit import report as stiffness_report
+    from studies.stiffness_fit.study import fit_stiffness_of
 
     folder = ResultsFolder(out or Path("results") / f"stiffness_{data.resolve().name}")
-    analysis = stiffness.fit_stiffness_of(
+    analysis = fit_stiffness_of(
         data, folder, zone=zone, method=method, knots=knots, channels=channel or (),
         quiet=quiet or as_json,
     )  # fmt: skip
-    summary = [stiffness.summary_table(analysis), *analysis["notes"]]
+    summary = [stiffness_report.summary_table(analysis), *analysis.notes]
     _print_analysis(analysis, summary, folder.path, quiet=quiet, as_json=as_json)
 
 
@@ -340,7 +341,7 @@ def effects(
 
 
 def _print_analysis(
-    analysis: dict[str, Any], summary: Iterable[Any], path: Path, *, quiet: bool, as_json: bool
+    analysis: Any, summary: Iterable[Any], path: Path, *, quiet: bool, as_json: bool
 ) -> None:
     if as_json:
         _print_json({"folder": str(path), "analysis": analysis})

@@ -1,6 +1,8 @@
 """What Sobol' and Morris studies share: designs in blocks that exchange one factor at a time."""
 
 from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -12,12 +14,26 @@ from mcstudy.studyfile.schema import FactorStudy
 from mcstudy.studyfile.study_inputs import check_independent, map_inputs
 from mcstudy.studyfile.study_outputs import report_outputs
 from studies.kind import StudyKind
-from studies.runs import ModelRuns, RunPlan, complete_blocks, load_study_model
+from studies.runs import ModelRuns, RunEnds, RunPlan, complete_blocks, load_study_model
+
+
+@dataclass(frozen=True)
+class FactorAnalysis(RunEnds):
+    """First part of the analysis of a design in blocks.
+
+    Attributes
+    ----------
+    groups : members of the factors that are groups of inputs.
+    """
+
+    groups: Mapping[str, Sequence[str]]
+
 
 Study = TypeVar("Study", bound=FactorStudy)
+Analysis = TypeVar("Analysis", bound=FactorAnalysis)
 
 
-class FactorKind(StudyKind[Study, RunPlan, ModelRuns]):
+class FactorKind(StudyKind[Study, RunPlan, ModelRuns, Analysis]):
     """A kind of study of one model whose runs come in blocks."""
 
     def plan(self, study: Study, folder: ResultsFolder) -> RunPlan:

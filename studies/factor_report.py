@@ -1,17 +1,15 @@
 """Sentences common to the reports of Morris and Sobol' studies."""
 
-from collections.abc import Mapping
-from typing import Any
-
 from mcstudy.figures import style
+from studies.factor_kind import FactorAnalysis
 
 
-def groups_said(analysis: Mapping[str, Any]) -> str:
+def groups_said(analysis: FactorAnalysis) -> str:
     """Return a sentence on the inputs of each factor."""
-    if not analysis["groups"]:
+    if not analysis.groups:
         return "Every input is a separate factor."
     text = "; ".join(
         f"{group}: {', '.join(style.words(name) for name in names)}"
-        for group, names in analysis["groups"].items()
+        for group, names in analysis.groups.items()
     )
     return f"Factors that are groups of inputs: {text}."

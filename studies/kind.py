@@ -16,14 +16,16 @@ from mcstudy.execution.workers import Workers
 from mcstudy.report import Section, Table
 from mcstudy.studyfile.schema import AnyStudy
 from studies.publishing import publish
+from studies.runs import RunEnds
 
 Study = TypeVar("Study", bound=AnyStudy)
 Plan = TypeVar("Plan")
 Results = TypeVar("Results")
+Analysis = TypeVar("Analysis", bound=RunEnds)
 
 
 @dataclass(frozen=True)
-class Finished(Generic[Study, Results]):
+class Finished(Generic[Study, Results, Analysis]):
     """A study whose runs are analysed: what figures and report are made of.
 
     Attributes
@@ -32,25 +34,28 @@ class Finished(Generic[Study, Results]):
         Study file of the kind, checked.
     results : Results
         From ``StudyKind.results``.
-    analysis : mapping
+    analysis : RunEnds
         From ``StudyKind.analyse``, as read from ``analysis.json``.
     """
 
     study: Study
     results: Results
-    analysis: Mapping[str, Any]
+    analysis: Analysis
 
 
-class StudyKind(ABC, Generic[Study, Plan, Results]):
+class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
     """A kind of study whose runs are kept in a results folder.
 
     Attributes
     ----------
     schema : type
         Class of its study file.
+    analysis : type
+        Frozen dataclass of every number of its report, an object in ``analysis.json``.
     """
 
     schema: ClassVar[type[AnyStudy]]
+    analysis: ClassVar[type[RunEnds]]
 
     def run(
         self,
@@ -60,7 +65,7 @@ class StudyKind(ABC, Generic[Study, Plan, Results]):
         *,
         workers: Workers = -1,
         quiet: bool = False,
-    ) -> dict[str, Any]:
+    ) -> Analysis:
         """Run or resume a study and write its results folder.
 
         Parameters
@@ -76,11 +81,6 @@ class StudyKind(ABC, Generic[Study, Plan, Results]):
         quiet : bool
             No progress line.
 
-        Returns
-        -------
-        dict
-            The analysis, as in ``analysis.json``.
-
         Raises
         ------
         UserError
@@ -94,7 +94,7 @@ class StudyKind(ABC, Generic[Study, Plan, Results]):
             self.execute(study, plan, folder, workers=workers, quiet=quiet)
             return self.build_report(study, folder)
 
-    def build_report(self, study: Study, folder: ResultsFolder) -> dict[str, Any]:
+    def build_report(self, study: Study, folder: ResultsFolder) -> Analysis:
         """Analyse a results folder and write its figures and report, without running the model.
 
         Parameters
@@ -173,7 +173,7 @@ class StudyKind(ABC, Generic[Study, Plan, Results]):
         """
 
     @abstractmethod
-    def analyse(self, study: Study, results: Results) -> dict[str, Any]:
+    def analyse(self, study: Study, results: Results) -> Analysis:
         """Return every number that the report prints.
 
         Parameters
@@ -185,28 +185,22 @@ class StudyKind(ABC, Generic[Study, Plan, Results]):
         """
 
     @abstractmethod
-    def subtitle(self, done: Finished[Study, Results]) -> str:
+    def subtitle(self, done: Finished[Study, Results, Analysis]) -> str:
         """Return the line below the report's title."""
 
     @abstractmethod
-    def draw(self, done: Finished[Study, Results]) -> Mapping[str, Any]:
+    def draw(self, done: Finished[Study, Results, Analysis]) -> Mapping[str, Any]:
         """Return the figures by file name."""
 
     @abstractmethod
     def sections(
-        self, done: Finished[Study, Results], figures: Mapping[str, Any]
+        self, done: Finished[Study, Results, Analysis], figures: Mapping[str, Any]
     ) -> Sequence[Section]:
         """Return the sections of the report, from what ``draw`` returns."""
 
     @abstractmethod
-    def summarise(self, analysis: Mapping[str, Any]) -> list[str] | list[Table]:
-        """Return the command line's summary of an analysis, paragraphs or tables.
-
-        Parameters
-        ----------
-        analysis : mapping
-            From ``analyse``, as read from ``analysis.json``.
-        """
+    def summarise(self, analysis: Analysis) -> list[str] | list[Table]:
+        """Return the command line's summary of an analysis, paragraphs or tables."""
 
     def independent_rows(self, runs: Any, folder: ResultsFolder) -> Any:
         """Return the rows of a table of runs that are an independent sample of the inputs.

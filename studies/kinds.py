@@ -18,7 +18,7 @@ from studies.morris.study import Morris
 from studies.reconstruction.schema import Reconstruction
 from studies.sobol.study import Sobol
 
-KINDS: dict[str, StudyKind[Any, Any, Any]] = {
+KINDS: dict[str, StudyKind[Any, Any, Any, Any]] = {
     kind.name: kind
     for kind in (
         MonteCarlo(),

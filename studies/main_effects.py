@@ -1,20 +1,18 @@
 """Main effects of a study's inputs, in the units of its file."""
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from mcstudy import units
-from mcstudy.sensitivity.main_effects import main_effect
+from mcstudy.sensitivity.main_effects import MainEffect, main_effect
 from mcstudy.studyfile.schema import SampledStudy
 from models.protocol import Model
 
 
 def main_effects_of(
     study: SampledStudy, model: Model, runs: pd.DataFrame, output: str
-) -> dict[str, Any]:
+) -> dict[str, MainEffect]:
     """Return the conditional mean of an output along each sampled input.
 
     Parameters
@@ -27,11 +25,6 @@ def main_effects_of(
         Independent draws of the inputs.
     output : str
         Name of the output.
-
-    Returns
-    -------
-    dict
-        By input ``unit`` and what ``main_effect`` gives.
     """
     values: NDArray[np.float64] = runs[output].to_numpy(dtype=float)
     model_unit = {item.name: item.unit for item in model.inputs}
@@ -39,5 +32,5 @@ def main_effects_of(
     for name, entry in study.inputs.items():
         scale = 1.0 / units.factor(entry.unit, model_unit[name])
         inputs = scale * runs[name].to_numpy(dtype=float)
-        effects[name] = {"unit": entry.unit} | main_effect(inputs, values)
+        effects[name] = main_effect(inputs, values, entry.unit)
     return effects

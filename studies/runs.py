@@ -3,7 +3,7 @@
 import os
 import platform
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any, Protocol
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mcstudy.errors import UserError
 from mcstudy.execution import runner
 from mcstudy.execution.evaluator import Evaluator
-from mcstudy.execution.failures import endings, locate_failures
+from mcstudy.execution.failures import Ending, Failures, endings, locate_failures
 from mcstudy.execution.progress import Progress
 from mcstudy.execution.results import ResultsFolder, check_failures, digest, status_counts
 from mcstudy.execution.workers import Workers, parallel_backend
@@ -44,6 +44,26 @@ class DescribedStudy(Protocol):
     @property
     def max_failure_rate(self) -> float:
         """Share of the runs that may fail."""
+
+
+@dataclass(frozen=True)
+class RunEnds:
+    """How the runs of a study ended: the first part of every analysis.
+
+    Attributes
+    ----------
+    kind : kind of the study.
+    runs : number of runs.
+    status : number of runs by status.
+    endings : outcomes, the most frequent first.
+    failures : number and location of the failed runs.
+    """
+
+    kind: str
+    runs: int
+    status: Mapping[str, int]
+    endings: Sequence[Ending]
+    failures: Failures
 
 
 @dataclass(frozen=True)
@@ -229,7 +249,7 @@ def describe_runs(
     model: Model,
     runs: pd.DataFrame,
     block: int = 1,
-) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+) -> tuple[RunEnds, NDArray[np.bool_]]:
     """Return the status of the runs of a study, and (n,) which are complete.
 
     Parameters
@@ -254,7 +274,7 @@ def describe_ends(
     complete: NDArray[np.bool_],
     words: frozenset[str],
     block: int = 1,
-) -> dict[str, Any]:
+) -> RunEnds:
     """Return the status of the runs of a study, as every analysis holds it.
 
     Parameters
@@ -270,18 +290,18 @@ def describe_ends(
     block : int
         Rows of a block.
     """
-    return {
-        "kind": study.kind,
-        "runs": len(runs),
-        "status": status_counts(runs),
-        "endings": endings(runs, words),
-        "failures": locate_failures(runs[list(study.inputs)], ~complete, block),
-    }
+    return RunEnds(
+        kind=study.kind,
+        runs=len(runs),
+        status=status_counts(runs),
+        endings=endings(runs, words),
+        failures=locate_failures(runs[list(study.inputs)], ~complete, block),
+    )
 
 
 def check_failure_rate(
     study: DescribedStudy, model: Model, runs: pd.DataFrame, block: int = 1
-) -> tuple[dict[str, Any], NDArray[np.bool_]]:
+) -> tuple[RunEnds, NDArray[np.bool_]]:
     """Return the result of ``describe_runs``, if the failure rate is allowed.
 
     Parameters

@@ -1,7 +1,7 @@
 """Failed runs: their number and their location in the input space."""
 
-from collections.abc import Collection
-from typing import Any
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -20,7 +20,59 @@ SURE = 2.5
 chance."""
 
 
-def locate_failures(inputs: pd.DataFrame, failed: Flags, block: int = 1) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Place:
+    """Place of the failures along an input.
+
+    Attributes
+    ----------
+    mean_rank : of the failed runs, 0 lowest to 1 highest.
+    place : ``low``, ``high``, at both ``ends`` or in the ``middle``.
+    """
+
+    mean_rank: float
+    place: str
+
+
+@dataclass(frozen=True)
+class Failures:
+    """Number and location of the failed runs.
+
+    Attributes
+    ----------
+    runs : number of failed runs.
+    share : of all runs.
+    blocks : number of blocks with a failed run.
+    where : place by input, for those along which failures are unevenly distributed.
+    map : share of failed runs in each tenth of each input.
+    """
+
+    runs: int
+    share: float
+    blocks: int
+    where: Mapping[str, Place]
+    map: Mapping[str, Sequence[float]]
+
+
+@dataclass(frozen=True)
+class Ending:
+    """Runs with the same outcome.
+
+    Attributes
+    ----------
+    status : status of the runs.
+    ending : ok, failed, invalid, timeout or crashed.
+    runs : number of runs.
+    reason : the most frequent one, empty where none was recorded.
+    """
+
+    status: str
+    ending: str
+    runs: int
+    reason: str
+
+
+def locate_failures(inputs: pd.DataFrame, failed: Flags, block: int = 1) -> Failures:
     """Return number and location of the failed runs.
 
     Parameters
@@ -31,28 +83,16 @@ def locate_failures(inputs: pd.DataFrame, failed: Flags, block: int = 1) -> dict
     block : int
         Rows that belong together, such as a base point's; they count as one in the test of
         uniformity.
-
-    Returns
-    -------
-    dict
-        ``runs``, ``share``, ``blocks`` (blocks with a failed run), ``map`` (share of failed runs in
-        each tenth of each input) and ``where``: for inputs along which failures are unevenly
-        distributed, their mean rank, 0 lowest to 1 highest, and whether they lie ``low``, ``high``,
-        at both ``ends`` or in the ``middle``.
     """
     n = len(inputs)
     count = int(failed.sum())
     blocks = np.arange(n) // block
     hit = np.unique(blocks[failed])
-    entry: dict[str, Any] = {
-        "runs": count,
-        "share": count / n if n else 0.0,
-        "blocks": int(hit.size),
-        "where": {},
-        "map": {},
-    }
+    where: dict[str, Place] = {}
+    shares: dict[str, list[float]] = {}
+    found = Failures(count, count / n if n else 0.0, int(hit.size), where, shares)
     if not count:
-        return entry
+        return found
     ranks = (inputs.rank().to_numpy() - 0.5) / n
     # Rows of a block share inputs: one mean rank a block, of no more than a uniform's variance.
     lost_ranks = pd.DataFrame(ranks[failed])
@@ -64,7 +104,7 @@ def locate_failures(inputs: pd.DataFrame, failed: Flags, block: int = 1) -> dict
     for k, name in enumerate(map(str, inputs.columns)):
         total = np.bincount(part[:, k], minlength=PARTS)
         lost = np.bincount(part[failed, k], minlength=PARTS)
-        entry["map"][name] = (lost / np.maximum(total, 1)).tolist()
+        shares[name] = (lost / np.maximum(total, 1)).tolist()
         place = None
         if inputs.iloc[:, k].nunique() < 2:
             continue
@@ -73,11 +113,11 @@ def locate_failures(inputs: pd.DataFrame, failed: Flags, block: int = 1) -> dict
         elif abs(from_middle[k] - 0.25) > SURE * middle_noise:
             place = "ends" if from_middle[k] > 0.25 else "middle"
         if place:
-            entry["where"][name] = {"mean_rank": float(means[k]), "place": place}
-    return entry
+            where[name] = Place(float(means[k]), place)
+    return found
 
 
-def endings(runs: pd.DataFrame, complete: Collection[str]) -> list[dict[str, Any]]:
+def endings(runs: pd.DataFrame, complete: Collection[str]) -> list[Ending]:
     """Return the outcomes of the runs, the most frequent first.
 
     Parameters
@@ -86,12 +126,6 @@ def endings(runs: pd.DataFrame, complete: Collection[str]) -> list[dict[str, Any
         With ``status`` and ``reason``.
     complete : collection of str
         Statuses that are no failure.
-
-    Returns
-    -------
-    list of dict
-        ``status``, ``ending`` (ok, failed, invalid, timeout or crashed), ``runs`` and the most
-        frequent ``reason``, empty where none was recorded.
     """
     found = []
     told = runs["reason"] if "reason" in runs.columns else pd.Series("", index=runs.index)
@@ -99,11 +133,11 @@ def endings(runs: pd.DataFrame, complete: Collection[str]) -> list[dict[str, Any
         word = str(status)
         reasons = told[(runs["status"] == status) & (told != "")]
         found.append(
-            {
-                "status": word,
-                "ending": "ok" if word in complete else _ENDINGS.get(word, "failed"),
-                "runs": int(count),
-                "reason": str(reasons.mode().iloc[0]) if len(reasons) else "",
-            }
+            Ending(
+                status=word,
+                ending="ok" if word in complete else _ENDINGS.get(word, "failed"),
+                runs=int(count),
+                reason=str(reasons.mode().iloc[0]) if len(reasons) else "",
+            )
         )
     return found

@@ -19,7 +19,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -28,8 +28,12 @@ import pyarrow.parquet as pq
 
 from mcstudy.errors import StudyError, UserError
 from mcstudy.simulator import HistoryLike
+from mcstudy.typed_json import from_plain, to_plain
+
+Analysis = TypeVar("Analysis")
 
 RUNS = "runs.parquet"
+ANALYSIS = "analysis.json"
 _DIGEST = b"mcstudy.digest"
 _CELL = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,79}(/[A-Za-z0-9][A-Za-z0-9_.-]{0,79})?")
 
@@ -229,6 +233,28 @@ class ResultsFolder:
             raise UserError(f"{self.path / name}: is not a JSON object")
         return content
 
+    def read_analysis(self, kind: type[Analysis]) -> Analysis:
+        """Return the analysis of the folder.
+
+        Parameters
+        ----------
+        kind : type
+            Its dataclass.
+
+        Raises
+        ------
+        UserError
+            If it is missing, or not of this kind.
+        """
+        content = self.read_json(ANALYSIS)
+        try:
+            return from_plain(kind, content)
+        except ValueError as error:
+            raise UserError(
+                f"{self.path / ANALYSIS}: is no {kind.__name__}; write it again with "
+                f"'mcstudy report' ({str(error)[:200]})"
+            ) from None
+
     def history(self, run: int) -> dict[str, pd.DataFrame]:
         """Return the kept time histories of a run: a frame with a ``time`` column by group.
 
@@ -278,8 +304,8 @@ def _replacing(target: Path) -> Iterator[Path]:
 
 
 def to_json(content: Any) -> str:
-    """Return JSON text; NumPy values become plain ones, NaN and infinity null."""
-    return json.dumps(_plain(content), indent=2, allow_nan=False) + "\n"
+    """Return JSON text; dataclasses become objects, NaN and infinity null."""
+    return json.dumps(to_plain(content), indent=2, allow_nan=False) + "\n"
 
 
 def read_runs(file: Path) -> pd.DataFrame:
@@ -349,17 +375,3 @@ def check_failures(counts: Mapping[str, int], failed: set[str], limit: float) ->
         raise StudyError(
             f"{share:.1%} of the runs failed ({detail}), above max_failure_rate = {limit:.1%}"
         )
-
-
-def _plain(content: Any) -> Any:
-    if isinstance(content, Mapping):
-        return {str(key): _plain(value) for key, value in content.items()}
-    if isinstance(content, list | tuple):
-        return [_plain(value) for value in content]
-    if isinstance(content, np.ndarray):
-        return _plain(content.tolist())
-    if isinstance(content, np.generic):
-        return _plain(content.item())
-    if isinstance(content, float) and not np.isfinite(content):
-        return None
-    return content

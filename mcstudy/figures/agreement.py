@@ -1,7 +1,6 @@
 """Agreement of two methods: pairs, limits of agreement, variance split, disagreement."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,8 +8,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from mcstudy.agreement import Agreement, Sources, VarianceSplit
 from mcstudy.figures import style
-from mcstudy.statistics import varies
+from mcstudy.statistics import Estimate, by_size, varies
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ def draw_pairs(
     values: Mapping[str, Array],
     units: Mapping[str, str],
     labels: tuple[str, str],
-    found: Mapping[str, Mapping[str, Any]],
+    found: Mapping[str, Agreement],
 ) -> Figure:
     """Return the runs of two methods against each other, and below them the limits of agreement.
 
@@ -39,7 +39,7 @@ def draw_pairs(
     labels : (str, str)
         Of the two methods.
     found : mapping
-        Agreement by output, as in the analysis.
+        Agreement by output.
     """
     with style.styled():
         figure = style.new_figure(4.4 * len(values), 7.4)
@@ -58,13 +58,14 @@ def draw_pairs(
         return figure
 
 
-def _scatter(axes: Axes, pair: Array, found: Mapping[str, Any]) -> None:
+def _scatter(axes: Axes, pair: Array, found: Agreement) -> None:
     axes.scatter(pair[:, 0], pair[:, 1], s=7, color=style.BLUE, alpha=0.35, linewidths=0)
     ends = style.ends_of(_inner(pair), below=0.06, above=0.06)
     axes.plot(ends, ends, color="black", linewidth=1.0, linestyle="--", label="equal")
     axes.set(xlim=ends, ylim=ends, aspect="equal")
-    rank = found["rank_correlation"]
-    text = "no rank correlation" if rank["value"] is None else f"rank correlation {_spanned(rank)}"
+    rank = found.rank_correlation
+    known = np.isfinite(rank.value)
+    text = f"rank correlation {_with_interval(rank)}" if known else "no rank correlation"
     axes.plot([], [], linestyle="none", label=text)
     axes.legend(loc="upper left", fontsize=8, framealpha=0.9, handlelength=1.2)
 
@@ -75,40 +76,38 @@ def _inner(values: Array) -> tuple[float, float]:
     return float(low), float(np.quantile(values, 0.998, method="higher"))
 
 
-def _spanned(estimate: Mapping[str, Any]) -> str:
-    value, low, high = (estimate[key] for key in ("value", "low", "high"))
-    if low is None or high is None:
-        return f"{value:.2f}"
-    return f"{value:.2f} ({low:.2f} to {high:.2f})"
+def _with_interval(estimate: Estimate) -> str:
+    shown = f"{estimate.value:.2f}"
+    return (
+        f"{shown} ({estimate.low:.2f} to {estimate.high:.2f})" if estimate.has_interval else shown
+    )
 
 
-def _limits(axes: Axes, pair: Array, found: Mapping[str, Any]) -> None:
+def _limits(axes: Axes, pair: Array, found: Agreement) -> None:
     difference = pair[:, 1] - pair[:, 0]
     axes.scatter(pair.mean(axis=1), difference, s=7, color=style.BLUE, alpha=0.35, linewidths=0)
-    for key, label, line in (
-        ("bias", "mean difference", "-"),
-        ("upper", "95 % limits of agreement", "--"),
-        ("lower", None, "--"),
+    for entry, label, line in (
+        (found.bias, "mean difference", "-"),
+        (found.upper, "95 % limits of agreement", "--"),
+        (found.lower, None, "--"),
     ):
-        entry = found[key]
-        axes.axhline(entry["value"], color=style.RED, linewidth=1.4, linestyle=line, label=label)
-        if entry["low"] is not None and entry["high"] is not None:
-            axes.axhspan(entry["low"], entry["high"], color=style.RED, alpha=0.12, linewidth=0)
+        axes.axhline(entry.value, color=style.RED, linewidth=1.4, linestyle=line, label=label)
+        if entry.has_interval:
+            axes.axhspan(entry.low, entry.high, color=style.RED, alpha=0.12, linewidth=0)
     axes.axhline(0.0, color="black", linewidth=0.8)
-    lines = [found["lower"]["value"], found["upper"]["value"], 0.0]
+    lines = [found.lower.value, found.upper.value, 0.0]
     axes.set_ylim(*style.ends_of([*_inner(difference), *lines], below=0.08, above=0.28))
     axes.set_xlim(*style.ends_of(pair.mean(axis=1)))
     axes.legend(loc="upper left", fontsize=8, framealpha=0.9)
 
 
-def draw_variance(split: Mapping[str, Mapping[str, Any]]) -> Figure:
+def draw_variance(split: Mapping[str, VarianceSplit]) -> Figure:
     """Return the shares of each output's variance: inputs, method, interaction.
 
     Parameters
     ----------
     split : mapping
-        ``method``, ``inputs`` and ``together`` (value, low, high) by output; null where it does not
-        vary.
+        Split by output.
     """
     with style.styled():
         figure = style.new_figure(7.2, 0.62 * len(split) + 1.5)
@@ -116,12 +115,12 @@ def draw_variance(split: Mapping[str, Mapping[str, Any]]) -> Figure:
         places = np.arange(len(split))[::-1]
         left = np.zeros(len(split))
         for place, entry in zip(places, split.values(), strict=True):
-            if entry["inputs"]["value"] is None:
+            if not np.isfinite(entry.inputs.value):
                 axes.barh(place, 1.0, 0.62, color="#F4F4F4", edgecolor="#C4C4C4", hatch="///",
                           linewidth=0.0)  # fmt: skip
                 axes.text(0.5, place, "does not vary", ha="center", va="center", fontsize=9)
         for key, (label, colour) in _SHARES.items():
-            shares = np.array([entry[key]["value"] or 0.0 for entry in split.values()])
+            shares = np.nan_to_num([getattr(entry, key).value for entry in split.values()])
             axes.barh(places, shares, 0.62, left=left, color=colour, label=label)
             for place, start, share in zip(places, left, shares, strict=True):
                 if share >= 0.045:
@@ -138,15 +137,15 @@ def draw_variance(split: Mapping[str, Mapping[str, Any]]) -> Figure:
         return figure
 
 
-def draw_breaking(breaking: Mapping[str, Mapping[str, Any]]) -> Figure:
+def draw_breaking(breaking: Mapping[str, Sources]) -> Figure:
     """Return the sources of disagreement: gains in rank correlation without an input's part.
 
     Parameters
     ----------
     breaking : mapping
-        ``gains`` by input and ``noise`` by output; null where there is no rank correlation.
+        Sources of disagreement by output; NaN where there is no rank correlation.
     """
-    count = len(next(iter(breaking.values()))["gains"])
+    count = len(next(iter(breaking.values())).gains)
     with style.styled():
         figure = style.new_figure(4.3 * len(breaking), 0.27 * count + 1.5)
         row = figure.subplots(1, len(breaking), squeeze=False)[0]
@@ -154,16 +153,16 @@ def draw_breaking(breaking: Mapping[str, Mapping[str, Any]]) -> Figure:
             axes.set_title(style.words(name))
             axes.tick_params(axis="y", length=0)
             axes.grid(visible=False, axis="y")
-            if entry["noise"] is None:
+            if not np.isfinite(entry.noise):
                 axes.text(0.5, 0.5, "no rank correlation:\nit does not vary", ha="center",
                           va="center", transform=axes.transAxes)  # fmt: skip
                 axes.set(xticks=[], yticks=[])
                 continue
-            order = sorted(entry["gains"], key=lambda k: entry["gains"][k])
-            gains = [entry["gains"][key] for key in order]
-            colours = [style.BLUE if gain > entry["noise"] else "#B9C6CF" for gain in gains]
+            order = by_size(entry.gains)[::-1]
+            gains = [entry.gains[key] for key in order]
+            colours = [style.BLUE if gain > entry.noise else "#B9C6CF" for gain in gains]
             axes.barh(np.arange(count), gains, 0.66, color=colours)
-            axes.axvline(entry["noise"], color="black", linestyle="--", linewidth=1.0,
+            axes.axvline(entry.noise, color="black", linestyle="--", linewidth=1.0,
                          label="noise line (dummies)")  # fmt: skip
             axes.axvline(0.0, color="black", linewidth=0.8)
             axes.set_yticks(np.arange(count), [style.words(key) for key in order])

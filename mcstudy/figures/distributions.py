@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mcstudy.figures import style
-from mcstudy.statistics import varies
+from mcstudy.statistics import Described, Distribution, Estimate, varies
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ def draw_distributions(
     runs: pd.DataFrame,
     units: Mapping[str, str],
     marks: Mapping[str, Sequence[Mark]],
-    analysis: Mapping[str, Any],
+    described: Mapping[str, Described],
 ) -> Figure:
     """Return histogram (above) and cumulative share (below) of each output.
 
@@ -52,8 +52,8 @@ def draw_distributions(
         Outputs to draw and their units.
     marks : mapping
         Values to mark by output.
-    analysis : mapping
-        ``outputs`` of the analysis, for the intervals.
+    described : mapping
+        Distribution by output, for the intervals.
     """
     with style.styled():
         figure = style.new_figure(4.4 * len(units), 6.6)
@@ -61,7 +61,7 @@ def draw_distributions(
         for k, (name, unit) in enumerate(units.items()):
             values = runs[name].to_numpy(dtype=float)
             values = values[np.isfinite(values)]
-            _histogram(axes[0, k], values, analysis[name], marks.get(name, ()))
+            _histogram(axes[0, k], values, described[name], marks.get(name, ()))
             _cumulative(axes[1, k], values, marks.get(name, ()))
             axes[1, k].set_xlabel(style.label(name, unit))
             axes[0, k].set_title(style.words(name))
@@ -71,16 +71,14 @@ def draw_distributions(
         return figure
 
 
-def _histogram(
-    axes: Axes, values: np.ndarray, analysis: Mapping[str, Any], marks: Sequence[Mark]
-) -> None:
+def _histogram(axes: Axes, values: np.ndarray, described: Described, marks: Sequence[Mark]) -> None:
     # The outermost 0.2 per cent on either side would compress the rest.
     low = np.quantile(values, 0.002, method="lower")
     high = np.quantile(values, 0.998, method="higher")
     shown = values[(values >= low) & (values <= high)]
-    if varies(shown):
+    if varies(shown) and isinstance(described, Distribution):
         sns.histplot(x=shown, bins=40, ax=axes, color=style.SKY, edgecolor="white", linewidth=0.3)
-        _interval(axes, analysis["quantiles"])
+        _interval(axes, described.quantiles)
     else:
         share = "all" if shown.size == values.size else f"{shown.size:,} of"
         said = f"{shown[0]:,.4g} in {share} {values.size:,} runs"
@@ -99,14 +97,14 @@ def _histogram(
     axes.legend(loc="upper right", frameon=True, framealpha=0.9, fontsize=8)
 
 
-def _interval(axes: Axes, quantiles: Mapping[str, Mapping[str, Any]]) -> None:
+def _interval(axes: Axes, quantiles: Mapping[str, Estimate]) -> None:
     """Draw the central 90 % and the median with its interval."""
-    central = (quantiles["0.05"]["value"], quantiles["0.95"]["value"])
+    central = (quantiles["0.05"].value, quantiles["0.95"].value)
     axes.axvspan(*central, color=style.BLUE, alpha=0.10, label="central 90 %", zorder=0)
     median = quantiles["0.5"]
-    axes.axvline(median["value"], color=style.BLUE, label="median, 95 % interval")
-    if median["low"] is not None and median["high"] is not None:
-        axes.axvspan(median["low"], median["high"], color=style.BLUE, alpha=0.35, linewidth=0)
+    axes.axvline(median.value, color=style.BLUE, label="median, 95 % interval")
+    if median.has_interval:
+        axes.axvspan(median.low, median.high, color=style.BLUE, alpha=0.35, linewidth=0)
 
 
 def _cumulative(axes: Axes, values: np.ndarray, marks: Sequence[Mark]) -> None:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from mcstudy.figures import style
 from mcstudy.figures.distributions import Mark
-from mcstudy.statistics import varies
+from mcstudy.statistics import Step, varies
 
 
 def draw_correlations(correlations: pd.DataFrame, noise: float) -> Figure:
@@ -173,15 +173,13 @@ def _spreads(pair: np.ndarray) -> bool:
     return bool(abs(np.corrcoef(pair.T)[0, 1]) < 1.0 - 1e-9)
 
 
-def draw_convergence(
-    tables: Mapping[str, Sequence[Mapping[str, float]]], units: Mapping[str, str]
-) -> Figure:
+def draw_convergence(tables: Mapping[str, Sequence[Step]], units: Mapping[str, str]) -> Figure:
     """Return the medians of each output over growing parts of the study.
 
     Parameters
     ----------
     tables : mapping
-        ``n`` and ``value`` of each part by output, at least one output.
+        Median of each part by output, at least one output.
     units : mapping
         Units by output.
     """
@@ -189,8 +187,8 @@ def draw_convergence(
         figure = style.new_figure(4.4 * len(tables), 2.9)
         row = figure.subplots(1, len(tables), squeeze=False)[0]
         for axes, (name, table) in zip(row, tables.items(), strict=True):
-            n = [entry["n"] for entry in table]
-            values = [entry["value"] for entry in table]
+            n = [entry.n for entry in table]
+            values = [entry.value for entry in table]
             axes.plot(n, values, "o-", color=style.BLUE)
             axes.set_ylim(*style.ends_of(values))
             axes.set_xscale("log", base=2)

@@ -9,6 +9,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mcstudy.figures import style
+from mcstudy.injury.risk_curve import RiskDescription, Rug
+from mcstudy.statistics import Estimate
 
 Array = NDArray[np.float64]
 
@@ -18,13 +20,13 @@ LEVEL_COLOURS = ("#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7", "#000000
 """Colours of AIS1 to AIS6, from Okabe and Ito's palette."""
 
 
-def draw_risk_curve(analysis: Mapping[str, Any], xlabel: str, title: str) -> Figure:
+def draw_risk_curve(found: RiskDescription, xlabel: str, title: str) -> Figure:
     """Return a fitted risk curve with band, cases, Turnbull's estimate, lines at 5, 25, 50 %.
 
     Parameters
     ----------
-    analysis : mapping
-        As returned by ``mcstudy.injury.risk_curve.describe_risk``.
+    found : RiskDescription
+        From ``mcstudy.injury.risk_curve.describe_risk``.
     xlabel : str
         Stimulus and unit.
     title : str
@@ -33,17 +35,16 @@ def draw_risk_curve(analysis: Mapping[str, Any], xlabel: str, title: str) -> Fig
     with style.styled():
         figure = style.new_figure(7.6, 4.8)
         axes = figure.subplots()
-        curve = analysis["curve"]
-        x = np.array(curve["stimulus"], dtype=float)
-        axes.fill_between(x, np.array(curve["low"]), np.array(curve["high"]), color=style.BLUE,
+        curve = found.curve
+        x = np.array(curve.stimulus, dtype=float)
+        axes.fill_between(x, np.array(curve.low), np.array(curve.high), color=style.BLUE,
                           alpha=0.18, linewidth=0, label="95 % band")  # fmt: skip
-        axes.plot(x, np.array(curve["risk"]), color=style.BLUE, linewidth=1.8,
-                  label=analysis["family"])  # fmt: skip
-        steps = analysis["turnbull"]
-        axes.plot(steps["stimulus"], steps["risk"], color=style.GREY, linewidth=1.0,
+        axes.plot(x, np.array(curve.risk), color=style.BLUE, linewidth=1.8,
+                  label=found.family)  # fmt: skip
+        axes.plot(found.turnbull.stimulus, found.turnbull.risk, color=style.GREY, linewidth=1.0,
                   linestyle="--", label="without a family (Turnbull)")  # fmt: skip
-        _draw_lines(axes, analysis["at"])
-        _draw_rug(axes, analysis["rug"])
+        _draw_lines(axes, found.at)
+        _draw_rug(axes, found.rug)
         axes.set(xlim=(0.0, float(x[-1])), ylim=(-0.06, 1.06), title=style.safe(title, 70))
         axes.set_xlabel(style.safe(xlabel, 70))
         axes.set_ylabel("risk [–]")
@@ -51,17 +52,17 @@ def draw_risk_curve(analysis: Mapping[str, Any], xlabel: str, title: str) -> Fig
         return figure
 
 
-def _draw_lines(axes: Axes, points: Mapping[str, Mapping[str, Any]]) -> None:
+def _draw_lines(axes: Axes, points: Mapping[str, Estimate]) -> None:
     for risk, entry in points.items():
-        p, at = float(risk), float(entry["value"])
+        p, at = float(risk), entry.value
         axes.plot([0.0, at, at], [p, p, -0.06], color=style.GREY, linewidth=0.8, linestyle=":")
         shown = f"{at:,.0f}" if 10.0 <= at < 1e6 else f"{at:.2g}"
         axes.annotate(f"{100 * p:g} %: {shown}", (0.0, p), xytext=(4, 2), fontsize=8,
                       textcoords="offset points", color=style.GREY)  # fmt: skip
 
 
-def _draw_rug(axes: Axes, rug: Mapping[str, Sequence[Any]]) -> None:
-    x, injured = np.array(rug["stimulus"], dtype=float), np.array(rug["injured"], dtype=bool)
+def _draw_rug(axes: Axes, rug: Rug) -> None:
+    x, injured = np.array(rug.stimulus, dtype=float), np.array(rug.injured, dtype=bool)
     for held, height, colour, label in (
         (injured, 1.03, style.RED, "injured"), (~injured, -0.03, style.GREEN, "uninjured"),
     ):  # fmt: skip

@@ -1,7 +1,6 @@
 """Sensitivity indices: bars with intervals, heat maps, main effects, convergence."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,47 +10,54 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mcstudy.figures import style
+from mcstudy.sensitivity.main_effects import MainEffect
+from mcstudy.statistics import Estimate, by_size
 
 Array = NDArray[np.float64]
 
 _SHARE = "share of the variance [–]"
 
 
-def draw_indices(outputs: Mapping[str, Mapping[str, Any]], dummy: str) -> Figure:
+def draw_indices(
+    outputs: Mapping[str, tuple[Mapping[str, Estimate], Mapping[str, Estimate]]], dummy: str
+) -> Figure:
     """Return first and total indices with intervals, a panel an output.
 
     Parameters
     ----------
     outputs : mapping
-        ``first`` and ``total`` (value, low, high by factor) by output.
+        First-order and total index by factor, by output.
     dummy : str
         Name of the dummy factor; the upper bound of its total index is the noise line.
     """
-    count = len(next(iter(outputs.values()))["total"])
+    count = len(next(iter(outputs.values()))[1])
     with style.styled():
         figure = style.new_figure(4.3 * len(outputs), 0.34 * count + 1.5)
         row = figure.subplots(1, len(outputs), squeeze=False)[0]
-        for axes, (name, entry) in zip(row, outputs.items(), strict=True):
-            _bars(axes, entry, dummy)
+        for axes, (name, (first, total)) in zip(row, outputs.items(), strict=True):
+            _bars(axes, first, total, dummy)
             axes.set_title(style.words(name))
         handles, labels = row[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=len(labels), fontsize=9)
         return figure
 
 
-def _bars(axes: Axes, entry: Mapping[str, Any], dummy: str) -> None:
-    order = sorted(entry["total"], key=lambda k: entry["total"][k]["value"] or 0.0)
+def _bars(
+    axes: Axes, first: Mapping[str, Estimate], total: Mapping[str, Estimate], dummy: str
+) -> None:
+    order = sorted(total, key=lambda k: np.nan_to_num(total[k].value))
     places = np.arange(len(order))
-    for shift, kind, colour in ((0.19, "first", style.BLUE), (-0.19, "total", style.ORANGE)):
-        values = column(entry[kind], order, "value")
-        low, high = (column(entry[kind], order, side) for side in ("low", "high"))
+    for shift, kind, table, colour in (
+        (0.19, "first", first, style.BLUE), (-0.19, "total", total, style.ORANGE),
+    ):  # fmt: skip
+        values, low, high = columns([table[name] for name in order])
         axes.barh(
             places + shift, values, 0.36, color=colour, label=f"{kind} index",
             xerr=np.maximum([values - low, high - values], 0.0),
             error_kw={"elinewidth": 1.0, "capsize": 1.5},
         )  # fmt: skip
-    noise = entry["total"][dummy]["high"]
-    if noise is not None:
+    noise = total[dummy].high
+    if np.isfinite(noise):
         axes.axvline(noise, color="black", linestyle="--", linewidth=1.0,
                      label="noise line (dummy)")  # fmt: skip
     axes.set_yticks(places, [style.quantity(name) for name in order])
@@ -61,27 +67,18 @@ def _bars(axes: Axes, entry: Mapping[str, Any], dummy: str) -> None:
     axes.grid(visible=False, axis="y")
 
 
-def column(table: Mapping[str, Mapping[str, Any]], order: Sequence[str], key: str) -> Array:
-    """Return one entry of each row in the given order, NaN for null.
-
-    Parameters
-    ----------
-    table : mapping
-        Rows by name.
-    order : sequence of str
-        Names of the rows.
-    key : str
-        Name of the entry.
-    """
-    return np.array([table[name][key] for name in order], dtype=float)
+def columns(estimates: Sequence[Estimate]) -> tuple[Array, Array, Array]:
+    """Return values, lower and upper ends of estimates."""
+    table = np.array([(e.value, e.low, e.high) for e in estimates], dtype=float).reshape(-1, 3)
+    return table[:, 0], table[:, 1], table[:, 2]
 
 
-def draw_heatmap(outputs: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """Return total indices of all outputs by factor; outputs that do not vary are hatched."""
+def draw_heatmap(outputs: Mapping[str, Mapping[str, Estimate]]) -> Figure:
+    """Return total indices by output and factor; outputs that do not vary are hatched."""
     table = pd.DataFrame(
         {
-            name: {factor: row["value"] for factor, row in entry["total"].items()}
-            for name, entry in outputs.items()
+            name: {factor: total.value for factor, total in totals.items()}
+            for name, totals in outputs.items()
         },
         dtype=float,
     ).T
@@ -107,13 +104,15 @@ def draw_heatmap(outputs: Mapping[str, Mapping[str, Any]]) -> Figure:
         return figure
 
 
-def draw_second_order(entry: Mapping[str, Any], factors: Sequence[str], title: str) -> Figure:
+def draw_second_order(
+    indices: Mapping[str, Estimate], factors: Sequence[str], title: str
+) -> Figure:
     """Return the matrix of second-order indices of one output; grey: not distinct from zero.
 
     Parameters
     ----------
-    entry : mapping
-        ``second`` (value, low, high) by pair of factors.
+    indices : mapping
+        Second-order index by pair of factors ``a x b``.
     factors : sequence of str
         Names of the factors.
     title : str
@@ -123,9 +122,9 @@ def draw_second_order(entry: Mapping[str, Any], factors: Sequence[str], title: s
     for i, a in enumerate(factors):
         for j, b in enumerate(factors):
             if i < j:
-                row = entry["second"][f"{a} x {b}"]
-                values[j, i] = row["value"]
-                distinct[j, i] = row["low"] is not None and (row["low"] > 0.0 or row["high"] < 0.0)
+                index = indices[f"{a} x {b}"]
+                values[j, i] = index.value
+                distinct[j, i] = index.low > 0.0 or index.high < 0.0
     with style.styled():
         figure = style.new_figure(0.6 * size + 2.6, max(0.42 * size + 1.6, 3.6))
         axes = figure.subplots()
@@ -151,13 +150,13 @@ def draw_second_order(entry: Mapping[str, Any], factors: Sequence[str], title: s
         return figure
 
 
-def draw_main_effects(effects: Mapping[str, Mapping[str, Any]], ylabel: str) -> Figure:
+def draw_main_effects(effects: Mapping[str, MainEffect], ylabel: str) -> Figure:
     """Return conditional mean (with its 95 % interval) and 90 % band of an output by input.
 
     Parameters
     ----------
     effects : mapping
-        ``unit``, ``x``, ``mean``, ``error``, ``low`` and ``high`` by input.
+        Main effect by input.
     ylabel : str
         Label of the output, with its unit.
     """
@@ -170,14 +169,15 @@ def draw_main_effects(effects: Mapping[str, Mapping[str, Any]], ylabel: str) -> 
             axes.set_visible(False)
         for axes, (name, entry) in zip(grid.flat, effects.items(), strict=False):
             x, mean, error, low, high = (
-                np.array(entry[key], dtype=float) for key in ("x", "mean", "error", "low", "high")
+                np.asarray(part, dtype=float)
+                for part in (entry.x, entry.mean, entry.error, entry.low, entry.high)
             )
             axes.fill_between(x, low, high, color=style.SKY, alpha=0.25, linewidth=0,
                               label="nine runs in ten")  # fmt: skip
             axes.fill_between(x, mean - 1.96 * error, mean + 1.96 * error, color=style.BLUE,
                               alpha=0.35, linewidth=0)  # fmt: skip
             axes.plot(x, mean, color=style.BLUE, label="conditional mean, 95 % interval")
-            axes.set_xlabel(style.label(name, entry["unit"]))
+            axes.set_xlabel(style.label(name, entry.unit))
         figure.supylabel(ylabel, fontsize=10)
         handles, labels = grid[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=min(2, columns),
@@ -189,20 +189,23 @@ MAX_LINES = 7
 """Number of factors in the convergence figure, the largest."""
 
 
-def draw_convergence(convergence: Mapping[str, Sequence[Mapping[str, Any]]]) -> Figure:
-    """Return total indices against the number of base points, a panel an output."""
+def draw_convergence(convergence: Mapping[str, Mapping[int, Mapping[str, Estimate]]]) -> Figure:
+    """Return total indices against the number of base points, a panel an output.
+
+    Parameters
+    ----------
+    convergence : mapping
+        Total indices by factor, by output and number of base points in ascending order.
+    """
     with style.styled():
         figure = style.new_figure(4.3 * len(convergence), 4.4)
         row = figure.subplots(1, len(convergence), squeeze=False)[0]
         for axes, (name, steps) in zip(row, convergence.items(), strict=True):
-            last = steps[-1]["total"]
-            order = sorted(last, key=lambda k: -(last[k]["value"] or 0.0))[:MAX_LINES]
-            n = np.array([step["n"] for step in steps], dtype=float)
+            n = np.array(list(steps), dtype=float)
+            last = list(steps.values())[-1]
+            order = by_size({factor: total.value for factor, total in last.items()})[:MAX_LINES]
             for k, factor in enumerate(order):
-                value, low, high = (
-                    np.array([step["total"][factor][key] for step in steps], dtype=float)
-                    for key in ("value", "low", "high")
-                )
+                value, low, high = columns([totals[factor] for totals in steps.values()])
                 colour = style.PALETTE[k % len(style.PALETTE)]
                 axes.fill_between(n, low, high, color=colour, alpha=0.15, linewidth=0)
                 axes.plot(n, value, color=colour, marker="o", markersize=3,

@@ -1,6 +1,7 @@
 """A risk curve with the quantities that ISO/TS 18506 requires in its report."""
 
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,8 @@ from mcstudy.injury.survival import (
     quality_class,
 )
 from mcstudy.injury.turnbull import estimate_steps
-from mcstudy.statistics import REACH
+from mcstudy.statistics import REACH, Estimate
+from mcstudy.typed_json import Real
 
 Array = NDArray[np.float64]
 
@@ -26,7 +28,99 @@ INFLUENTIAL = 1.0
 """Standard errors by which leaving out one case may move the curve (assumed)."""
 
 
-def describe_risk(observations: Observations) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Family:
+    """A fitted family: parameters of its linear predictor in ln x, and its likelihood."""
+
+    intercept: Real
+    slope: Real
+    median: Real
+    log_likelihood: Real
+    aic: Real
+
+
+@dataclass(frozen=True)
+class StimulusAt(Estimate):
+    """Stimulus at a risk, with the width of its interval over it and the class of that."""
+
+    quality_index: Real
+    quality: str
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Risk along the stimulus with its 95 % band."""
+
+    stimulus: Sequence[Real]
+    risk: Sequence[Real]
+    low: Sequence[Real]
+    high: Sequence[Real]
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Turnbull's estimate: corners of its steps."""
+
+    stimulus: Sequence[Real]
+    risk: Sequence[Real]
+
+
+@dataclass(frozen=True)
+class Rug:
+    """Stimulus of every case and whether it is injured."""
+
+    stimulus: Sequence[Real]
+    injured: Sequence[bool]
+
+
+@dataclass(frozen=True)
+class Shift:
+    """Shift of the curve without a case in standard errors, NaN if it leaves no curve."""
+
+    case: int
+    shift: Real
+
+
+@dataclass(frozen=True)
+class Influence:
+    """Influence of single cases: the largest shifts, and the number of influential cases."""
+
+    largest: Sequence[Shift]
+    influential: int
+
+
+@dataclass(frozen=True)
+class RiskDescription:
+    """Fits of all families, details of the best one, and Turnbull's estimate.
+
+    Attributes
+    ----------
+    cases : number of cases.
+    weight : sum of their weights, where they have any.
+    counted : whether the weights count cases.
+    injured, exact : number of injured cases and of exact observations.
+    family : name of the best family, by the AIC.
+    families : fits by name, best first.
+    at : stimulus by risk.
+    curve, turnbull, rug : what is drawn.
+    influence : of single cases; None if there are too many to leave out each.
+    """
+
+    cases: int
+    weight: float | None
+    counted: bool
+    injured: int
+    exact: int
+    family: str
+    families: Mapping[str, Family]
+    at: Mapping[str, StimulusAt]
+    curve: Curve
+    turnbull: Steps
+    rug: Rug
+    influence: Influence | None
+
+
+def describe_risk(observations: Observations) -> RiskDescription:
     """Return the fits of all families, details of the best one, and Turnbull's estimate.
 
     Parameters
@@ -45,20 +139,20 @@ def describe_risk(observations: Observations) -> dict[str, Any]:
     low, high = best.band(grid)
     steps = estimate_steps(observations)
     x, risk = steps.steps()
-    return {
-        "cases": observations.size,
-        "weight": None if observations.weight is None else float(observations.weights.sum()),
-        "counted": observations.counted,
-        "injured": int(observations.injured.sum()),
-        "exact": int(observations.exact.sum()),
-        "family": best.family,
-        "families": {fit.family: _parameters(fit) for fit in fits},
-        "at": {f"{p:g}": _at(best, p) for p in QUALITY_AT},
-        "curve": {"stimulus": grid, "risk": best.risk(grid), "low": low, "high": high},
-        "turnbull": {"stimulus": x, "risk": risk},
-        "rug": {"stimulus": held, "injured": observations.injured},
-        "influence": _influence(observations, best),
-    }
+    return RiskDescription(
+        cases=observations.size,
+        weight=None if observations.weight is None else float(observations.weights.sum()),
+        counted=bool(observations.counted),
+        injured=int(observations.injured.sum()),
+        exact=int(observations.exact.sum()),
+        family=best.family,
+        families={fit.family: _parameters(fit) for fit in fits},
+        at={f"{p:g}": _at(best, p) for p in QUALITY_AT},
+        curve=Curve(*(part.tolist() for part in (grid, best.risk(grid), low, high))),
+        turnbull=Steps(x.tolist(), risk.tolist()),
+        rug=Rug(held.tolist(), observations.injured.tolist()),
+        influence=_influence(observations, best),
+    )
 
 
 def _fit_families(observations: Observations) -> list[RiskFit]:
@@ -74,26 +168,23 @@ def _fit_families(observations: Observations) -> list[RiskFit]:
     return sorted(fits, key=lambda fit: fit.aic)
 
 
-def _parameters(fit: RiskFit) -> dict[str, float]:
-    return {
-        "intercept": fit.intercept,
-        "slope": fit.slope,
-        "median": fit.stimulus_at(0.5)[0],
-        "log_likelihood": fit.log_likelihood,
-        "aic": fit.aic,
-    }
+def _parameters(fit: RiskFit) -> Family:
+    return Family(
+        intercept=fit.intercept,
+        slope=fit.slope,
+        median=fit.stimulus_at(0.5)[0],
+        log_likelihood=fit.log_likelihood,
+        aic=fit.aic,
+    )
 
 
-def _at(fit: RiskFit, risk: float) -> dict[str, Any]:
+def _at(fit: RiskFit, risk: float) -> StimulusAt:
     value, low, high = fit.stimulus_at(risk)
     index = fit.quality_index(risk)
-    return {
-        "value": value, "low": low, "high": high,
-        "quality_index": index, "quality": quality_class(index),
-    }  # fmt: skip
+    return StimulusAt(value, low, high, quality_index=index, quality=quality_class(index))
 
 
-def _influence(observations: Observations, fit: RiskFit) -> dict[str, Any] | None:
+def _influence(observations: Observations, fit: RiskFit) -> Influence | None:
     """Return the influence of leaving out each case on the curve, largest first.
 
     The shift is that of the stimulus at 5, 25 or 50 % risk, whichever moves most, in standard
@@ -113,7 +204,7 @@ def _influence(observations: Observations, fit: RiskFit) -> dict[str, Any] | Non
         moved = (centre - before) / (reach / REACH)
         shifts[k] = moved[np.argmax(np.abs(moved))]
     order = np.argsort(-np.abs(shifts))[:INFLUENCE_SHOWN]
-    return {
-        "largest": [{"case": int(k) + 1, "shift": float(shifts[k])} for k in order],
-        "influential": int(np.sum(np.abs(shifts) > INFLUENTIAL)),
-    }
+    return Influence(
+        largest=[Shift(int(k) + 1, float(shifts[k])) for k in order],
+        influential=int(np.sum(np.abs(shifts) > INFLUENTIAL)),
+    )

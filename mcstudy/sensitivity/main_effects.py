@@ -1,18 +1,40 @@
 """Main effect of one input: conditional mean and band of an output."""
 
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcstudy.statistics import scale_of
+from mcstudy.typed_json import Real
 
 Array = NDArray[np.float64]
 
 BINS = 16
 
 
-def main_effect(values: Array, outputs: Array) -> dict[str, Any]:
+@dataclass(frozen=True)
+class MainEffect:
+    """Conditional mean and band of an output along one input, in bins of equal counts.
+
+    Attributes
+    ----------
+    unit : unit of the input.
+    x : median of the input in each bin.
+    mean, error : conditional mean and its standard error.
+    low, high : ends of the central 90 % of the output.
+    """
+
+    unit: str
+    x: Sequence[Real]
+    mean: Sequence[Real]
+    error: Sequence[Real]
+    low: Sequence[Real]
+    high: Sequence[Real]
+
+
+def main_effect(values: Array, outputs: Array, unit: str = "1") -> MainEffect:
     """Return conditional mean, its standard error and the central 90 % of an output.
 
     Parameters
@@ -21,12 +43,8 @@ def main_effect(values: Array, outputs: Array) -> dict[str, Any]:
         Of the input.
     outputs : (n,) array
         NaN where undefined.
-
-    Returns
-    -------
-    dict
-        ``x`` (median of the input in each bin of equal counts), ``mean``, ``error``, ``low``,
-        ``high``.
+    unit : str
+        Of the input.
     """
     held = np.isfinite(outputs)
     x, scale = values[held], scale_of(outputs)
@@ -39,4 +57,4 @@ def main_effect(values: Array, outputs: Array) -> dict[str, Any]:
         if p.size > 1
     ]  # fmt: skip
     table = np.array(rows).reshape(-1, 5) * np.array([1.0, scale, scale, scale, scale])
-    return dict(zip(("x", "mean", "error", "low", "high"), table.T, strict=True))
+    return MainEffect(unit, *table.T.tolist())

@@ -69,8 +69,8 @@ def as_dict(found: Conclusions) -> dict[str, Any]:
     return {
         "output": OUTPUT,
         "limit": LIMIT,
-        "exceedance": found.exceedance.as_dict(),
-        "median": found.median.as_dict(),
-        "drivers": {name: entry.as_dict() for name, entry in found.drivers.items()},
+        "exceedance": found.exceedance,
+        "median": found.median,
+        "drivers": dict(found.drivers),
         "values": found.values,
     }

@@ -5,7 +5,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mcstudy.figures.style import words
+from mcstudy.statistics import Estimate
 from mcstudy.text import capital, interval, number, percent, quantity, unit
+from mcstudy.typed_json import from_plain
 
 SHOWN_UNITS = {"m": ("mm", 1e3), "rad": ("deg", 57.29577951308232), "m/N": ("mm/kN", 1e6),
                "N/m": ("kN/m", 1e-3), "N": ("kN", 1e-3)}  # fmt: skip
@@ -177,10 +179,15 @@ def conclusion_words(found: Mapping[str, Any] | None) -> list[str]:
     def first(part: Mapping[str, Any]) -> str:
         return words(max(part["drivers"], key=lambda n: part["drivers"][n]["value"]))
 
+    def known(key: str) -> tuple[Estimate, Estimate]:
+        return from_plain(Estimate, base[key]), from_plain(Estimate, extended[key])
+
+    exceedance, median = map(percent, known("exceedance")), map(interval, known("median"))
     return [
-        f"P(HIC15 > {limit}): {percent(base['exceedance'])} with the base model, "
-        f"{percent(extended['exceedance'])} with the extended model; median HIC15 "
-        f"{interval(base['median'])} and {interval(extended['median'])}.",
+        "P(HIC15 > {}): {} with the base model, {} with the extended model; ".format(
+            limit, *exceedance
+        )
+        + "median HIC15 {} and {}.".format(*median),
         f"Most influential input on HIC15: {first(base)} before, {first(extended)} after.",
     ]
 

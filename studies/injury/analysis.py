@@ -16,9 +16,23 @@ from mcstudy.sampling import seeds
 from mcstudy.statistics import Estimate, between_replicates, varies
 from models.protocol import Model
 from studies.injury.cells import fronts_of
+from studies.injury.numbers import (
+    Association,
+    Change,
+    FunctionRisk,
+    InjuryAnalysis,
+    LimitOf,
+    ObservedCase,
+    ObservedInjury,
+    Rating,
+    RocCurve,
+    ScenarioOutcome,
+    Together,
+)
 from studies.injury.schema import AS_IT_STANDS, HEAD, REFERENCE, InjuryStudy
 from studies.injury.speed import describe_speed
 from studies.paired_runs import BATCHES, batch_of
+from studies.runs import RunEnds
 
 Array = NDArray[np.float64]
 
@@ -73,8 +87,12 @@ def ages_of(study: InjuryStudy, runs: pd.DataFrame) -> Array:
 
 
 def analyse(
-    study: InjuryStudy, model: Model, cases: pd.DataFrame, functions: Mapping[str, RiskFunction]
-) -> dict[str, Any]:
+    study: InjuryStudy,
+    model: Model,
+    ended: RunEnds,
+    cases: pd.DataFrame,
+    functions: Mapping[str, RiskFunction],
+) -> InjuryAnalysis:
     """Return every number that the report prints.
 
     Parameters
@@ -83,6 +101,8 @@ def analyse(
         Checked study file.
     model : Model
         Model of the runs.
+    ended : RunEnds
+        How the runs ended.
     cases : DataFrame
         From ``outcomes_of``.
     functions : mapping
@@ -101,26 +121,31 @@ def analyse(
     for name, part in parts.items():
         if missing := [front for front in shares if not (part["front"] == front).any()]:
             raise StudyError(f"scenario {name}, front {missing[0]}: all runs failed")
-    analysis: dict[str, Any] = {
-        "fronts": shares,
-        "limit": study.limit.model_dump() | {"unit": _unit_of(model, study.limit.output)},
-        "scenarios": {},
-    }
     reference = parts[REFERENCE]
-    for name, part in parts.items():
-        entry = {"title": titles[name], "runs": len(part)} | _outcome(study, part, shares)
-        if name != REFERENCE:
-            entry["difference"] = _differences(study, reference, part, shares)
-        entry["association"] = _associations(study, model, proportional(part, shares))
-        entry["limit"] = {
-            mechanism: _limit(study, part, mechanism, shares)
-            for mechanism in _judged_by(study, functions)
-        }
-        analysis["scenarios"][name] = entry
-    analysis["functions"] = _by_function(study, reference, functions, shares)
-    analysis["observed"] = _observed(study, reference, functions, shares)
-    analysis["speed"] = describe_speed(study, cases, shares)
-    return analysis
+    return InjuryAnalysis(
+        **vars(ended),
+        fronts=shares,
+        limit=LimitOf(**study.limit.model_dump(), unit=_unit_of(model, study.limit.output)),
+        scenarios={
+            name: ScenarioOutcome(
+                title=titles[name],
+                runs=len(part),
+                **_outcome(study, part, shares),
+                association=_associations(study, model, proportional(part, shares)),
+                limit={
+                    mechanism: _limit(study, part, mechanism, shares)
+                    for mechanism in _judged_by(study, functions)
+                },
+                difference=None
+                if name == REFERENCE
+                else _differences(study, reference, part, shares),
+            )
+            for name, part in parts.items()
+        },
+        functions=_by_function(study, reference, functions, shares),
+        observed=_observed(study, reference, functions, shares),
+        speed=describe_speed(study, cases, shares),
+    )
 
 
 def _unit_of(model: Model, output: str) -> str:
@@ -201,17 +226,17 @@ def _outcome(study: InjuryStudy, part: pd.DataFrame, shares: Mapping[str, float]
     }
     return {
         "at_least": {
-            str(level): population(study, part, _head(part, level), shares).as_dict()
+            str(level): population(study, part, _head(part, level), shares)
             for level in LEVELS
         },
         "ais": distribution(exceeding).tolist(),
         "mechanisms": {k: distribution(np.array(v)).tolist() for k, v in mechanisms.items()},
-        "above_limit": population(study, part, above, shares).as_dict(),
+        "above_limit": population(study, part, above, shares),
         "by_front": {
             name: population(
                 study, part[part["front"] == name],
                 _head(part[part["front"] == name], limit.level), {name: 1.0},
-            ).as_dict()
+            )
             for name in shares
         },
     }  # fmt: skip
@@ -219,7 +244,7 @@ def _outcome(study: InjuryStudy, part: pd.DataFrame, shares: Mapping[str, float]
 
 def _differences(
     study: InjuryStudy, reference: pd.DataFrame, part: pd.DataFrame, shares: Mapping[str, float]
-) -> dict[str, Any]:
+) -> dict[str, Change]:
     """Return the change by a scenario per level; common random numbers reduce its variance."""
     found = {}
     for level in LEVELS:
@@ -227,13 +252,12 @@ def _differences(
         centre = [_mean(p, _head(p, level), shares) for p in (part, reference)]
         apart = np.asarray((batches[0] - batches[1]).dropna(), dtype=float)
         change = between_replicates(apart, centre[0] - centre[1])
-        found[str(level)] = change.as_dict() | {
-            "relative": centre[0] / centre[1] - 1.0 if centre[1] else np.nan
-        }
+        relative = centre[0] / centre[1] - 1.0 if centre[1] else np.nan
+        found[str(level)] = Change(**vars(change), relative=relative)
     return found
 
 
-def _associations(study: InjuryStudy, model: Model, part: pd.DataFrame) -> dict[str, Any]:
+def _associations(study: InjuryStudy, model: Model, part: pd.DataFrame) -> Association:
     """Return rank correlations with the drawn AIS, and its proportional-odds regression."""
     known = {item.name for item in model.inputs} | {item.name for item in model.outputs}
     names = [name for name in PREDICTORS if name in known]
@@ -241,25 +265,20 @@ def _associations(study: InjuryStudy, model: Model, part: pd.DataFrame) -> dict[
     constant = [name for name in names if not varies(held[name].to_numpy(dtype=float))]
     names = [name for name in names if name not in constant]
     levels = held["ais"].to_numpy()
-    found: dict[str, Any] = {
-        "runs": len(held), "rank": {}, "odds": None, "constant": constant,
-        "levels": sorted(set(levels.tolist())),
-    }  # fmt: skip
-    if len(held) < BATCHES or len(found["levels"]) < 2:
-        return found
+    drawn = sorted(set(levels.tolist()))
+    if len(held) < BATCHES or len(drawn) < 2:
+        return Association(len(held), {}, None, constant, drawn)
     rng = seeds.generator(study.seed, seeds.BOOTSTRAP)
-    for name in names:
-        pair = rank_correlations(held[name].to_numpy(dtype=float), levels, rng)
-        found["rank"][name] = {key: value.as_dict() for key, value in pair.items()}
+    rank = {
+        name: rank_correlations(held[name].to_numpy(dtype=float), levels, rng) for name in names
+    }
     try:
         fit = fit_proportional_odds({n: held[n].to_numpy(dtype=float) for n in names}, levels)
     except ValueError as error:
-        found["no_odds"] = str(error)
-        return found
-    found["odds"] = {name: fit.odds_ratio(name).as_dict() for name in names}
-    # McFadden's share of the log likelihood.
-    found["explained"] = 1.0 - fit.log_likelihood / fit.null_log_likelihood
-    return found
+        return Association(len(held), rank, None, constant, drawn, no_odds=str(error))
+    odds = {name: fit.odds_ratio(name) for name in names}
+    explained = 1.0 - fit.log_likelihood / fit.null_log_likelihood
+    return Association(len(held), rank, odds, constant, drawn, explained=explained)
 
 
 def _judged_by(study: InjuryStudy, functions: Mapping[str, RiskFunction]) -> list[str]:
@@ -274,17 +293,17 @@ def _judged_by(study: InjuryStudy, functions: Mapping[str, RiskFunction]) -> lis
 
 def _limit(
     study: InjuryStudy, part: pd.DataFrame, mechanism: str, shares: Mapping[str, float]
-) -> dict[str, Any]:
+) -> Rating | None:
     """Return the limit as a classifier, with intervals between the parts of the design.
 
-    It is empty where all runs have the same output, or are injured with certainty or never.
+    It is None where all runs have the same output, or are injured with certainty or never.
     """
     limit = study.limit
     stimulus = part[limit.output].to_numpy(dtype=float)
     risk = part[risk_column(mechanism, limit.level)].to_numpy(dtype=float)
     alike = np.isfinite(stimulus).all() and not varies(stimulus)
     if alike or not 0.0 < risk.mean() < 1.0:
-        return {}
+        return None
     weight = weights_of(part, shares)
     judged = judge_limit(stimulus, risk, limit.value, weight)
     roc = receiver_operating_characteristic(stimulus, risk, weight)
@@ -301,16 +320,13 @@ def _limit(
         rows.append((mine.sensitivity, mine.specificity, mine.positive, mine.negative, area))
     centre = (judged.sensitivity, judged.specificity, judged.positive, judged.negative, roc.area)
     names = ("sensitivity", "specificity", "positive", "negative", "area")
-    table = np.array(rows).T
-    found: dict[str, Any] = {
-        name: _within_bounds(between_replicates(column[np.isfinite(column)], value)).as_dict()
-        for name, column, value in zip(names, table, centre, strict=True)
-    }
+    estimates = (
+        _within_bounds(between_replicates(column[np.isfinite(column)], value))
+        for column, value in zip(np.array(rows).T, centre, strict=True)
+    )
     shown = np.linspace(0, roc.false_alarm.size - 1, min(200, roc.false_alarm.size)).astype(int)
-    return found | {
-        "best": roc.best,
-        "roc": {"false_alarm": roc.false_alarm[shown], "sensitivity": roc.sensitivity[shown]},
-    }
+    curve = RocCurve(roc.false_alarm[shown].tolist(), roc.sensitivity[shown].tolist())
+    return Rating(**dict(zip(names, estimates, strict=True)), best=roc.best, roc=curve)
 
 
 def _by_function(
@@ -318,21 +334,21 @@ def _by_function(
     reference: pd.DataFrame,
     functions: Mapping[str, RiskFunction],
     shares: Mapping[str, float],
-) -> dict[str, Any]:
+) -> dict[str, FunctionRisk]:
     """Return the mean risk by each risk function alone: the model-form uncertainty."""
     age = ages_of(study, reference)
     found = {}
     for name, function in functions.items():
         risks = exceedance(function, reference[function.stimulus].to_numpy(dtype=float), age)
-        found[name] = {
-            "title": function.title,
-            "label": function.label,
-            "source": function.source,
-            "at_least": {
-                str(level): population(study, reference, risks[:, level - 1], shares).as_dict()
+        found[name] = FunctionRisk(
+            title=function.title,
+            label=function.label,
+            source=function.source,
+            at_least={
+                str(level): population(study, reference, risks[:, level - 1], shares)
                 for level in function.levels
             },
-        }
+        )
     return found
 
 
@@ -341,7 +357,7 @@ def _observed(
     reference: pd.DataFrame,
     functions: Mapping[str, RiskFunction],
     shares: Mapping[str, float],
-) -> dict[str, Any]:
+) -> ObservedCase:
     """Return the probabilities of the injuries of the real case."""
     entries, risks = [], []
     age = ages_of(study, reference)
@@ -358,21 +374,20 @@ def _observed(
             risk, [0.05, 0.95], weights=weights_of(reference, shares), method="inverted_cdf"
         )
         entries.append(
-            {
-                "label": item.label,
-                "mechanism": item.mechanism,
-                "level": item.level,
-                "probability": population(study, reference, risk, shares).as_dict(),
-                "central_90": [float(low), float(high)],
-                "by_function": by_function,
-            }
+            ObservedInjury(
+                label=item.label,
+                mechanism=item.mechanism,
+                level=item.level,
+                probability=population(study, reference, risk, shares),
+                central_90=(float(low), float(high)),
+                by_function=by_function,
+            )
         )
-    found: dict[str, Any] = {"injuries": entries}
-    if len(risks) > 1:
-        stacked = np.stack(risks)
-        both = {"dependent": stacked.min(axis=0), "independent": stacked.prod(axis=0)}
-        found["all"] = {
-            name: population(study, reference, value, shares).as_dict()
-            for name, value in both.items()
-        }
-    return found
+    if len(risks) < 2:
+        return ObservedCase(entries)
+    stacked = np.stack(risks)
+    dependent, independent = (
+        population(study, reference, values, shares)
+        for values in (stacked.min(axis=0), stacked.prod(axis=0))
+    )
+    return ObservedCase(entries, Together(dependent, independent))

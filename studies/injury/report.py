@@ -1,111 +1,26 @@
 """The report of an injury study: outcomes, limits and curves, in text, tables and figures."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-import pandas as pd
-
-from mcstudy.figures import risk, style
-from mcstudy.injury.functions import RiskFunction, speed_curves
+from mcstudy.figures import style
+from mcstudy.injury.functions import RiskFunction
 from mcstudy.report import Section, Table
+from mcstudy.statistics import Estimate
 from mcstudy.text import capital, interval, number, percent
-from studies.failure_report import failure_map, failures_said, status_table
-from studies.injury.analysis import ages_of, proportional
+from studies.failure_report import failures_said, status_table
+from studies.injury.numbers import Change, InjuryAnalysis, ScenarioOutcome
+from studies.injury.pictures import ratings_of
 from studies.injury.schema import REFERENCE, InjuryStudy
 
 FEW = 1000.0
 """Number of impacts to which counts of injured refer."""
 
 
-def draw(
-    study: InjuryStudy,
-    cases: pd.DataFrame,
-    analysis: Mapping[str, Any],
-    functions: Mapping[str, RiskFunction],
-) -> dict[str, Any]:
-    """Return the study's figures by file name.
-
-    Parameters
-    ----------
-    study : InjuryStudy
-        Checked study file.
-    cases : DataFrame
-        Runs with risks and AIS.
-    analysis : mapping
-        As in ``analysis.json``.
-    functions : mapping
-        Risk functions by name.
-    """
-    scenarios = analysis["scenarios"]
-    reference = cases[cases["scenario"] == REFERENCE]
-    bars = {entry["title"]: entry["ais"] for entry in scenarios.values()}
-    bars |= {
-        f"{style.words(words)}, alone": shares
-        for words, shares in scenarios[REFERENCE]["mechanisms"].items()
-        if len(study.mechanisms) > 1
-    }
-    figures: dict[str, Any] = failure_map(analysis) | {"ais": risk.draw_ais(bars)}
-    age = np.array([float(np.median(ages_of(study, reference)))])
-    for stimulus in dict.fromkeys(function.stimulus for function in functions.values()):
-        held = reference[stimulus].dropna().to_numpy(dtype=float)
-        if held.size < 2:
-            continue
-        limit = study.limit.value if stimulus == study.limit.output else None
-        end = max(1.15 * float(np.quantile(held, 0.995)), 0.0)
-        if limit is not None and style.is_near(held, limit):
-            end = max(end, 1.15 * limit)
-        x = np.linspace(0.0, end or 1.0, 300)[1:]
-        mine = {key: f for key, f in functions.items() if f.stimulus == stimulus}
-        curves = {
-            f.title: {level: f.risk(level, x, age) for level in f.levels} for f in mine.values()
-        }
-        unit = next(iter(mine.values())).unit
-        figures[f"risk_{stimulus}"] = risk.draw_levels(
-            curves, x, held, style.label(stimulus, unit), limit
-        )
-    figures["exceedance"] = risk.draw_exceedance(
-        {
-            entry["title"]: proportional(cases[cases["scenario"] == name], analysis["fronts"])[
-                study.limit.output
-            ].to_numpy(float)
-            for name, entry in scenarios.items()
-        },
-        style.label(study.limit.output, analysis["limit"]["unit"]),
-        study.limit.value,
-    )
-    rocs = _judged(analysis)
-    if rocs:
-        figures["roc"] = risk.draw_roc(
-            {
-                title: (np.array(e["roc"]["false_alarm"]), np.array(e["roc"]["sensitivity"]))
-                for title, e in rocs.items()
-            },
-            {
-                title: (1.0 - e["specificity"]["value"], e["sensitivity"]["value"])
-                for title, e in rocs.items()
-            },
-            f"limit {study.limit.value:g}",
-        )
-    if analysis["speed"]:
-        figures["speed"] = _draw_speed(analysis["speed"])
-    return figures
-
-
-def _draw_speed(speed: Mapping[str, Any]) -> Any:
-    x = np.array(speed["speed"], dtype=float)
-    bands = {
-        name: {"speed": x} | {key: np.array(curve[key], dtype=float) for key in curve}
-        for name, curve in speed["curves"].items()
-    }
-    grid = np.linspace(max(5.0, float(x[0])), float(x[-1]), 100)
-    published = {c.title: (grid, c.risk(grid)) for c in speed_curves()}
-    return risk.draw_speed_risk(bands, published, "risk against impact speed")
-
-
 def sections_of(
     study: InjuryStudy,
-    analysis: Mapping[str, Any],
+    analysis: InjuryAnalysis,
     figures: Mapping[str, Any],
     functions: Mapping[str, RiskFunction],
 ) -> list[Section]:
@@ -115,14 +30,14 @@ def sections_of(
     ----------
     study : InjuryStudy
         Checked study file.
-    analysis : mapping
-        As in ``analysis.json``.
+    analysis : InjuryAnalysis
+        Every number of the report.
     figures : mapping
         Figures by file name.
     functions : mapping
         Risk functions by name.
     """
-    scenarios = analysis["scenarios"]
+    scenarios = analysis.scenarios
 
     def one(name: str, caption: str) -> dict[str, Any]:
         return {caption: figures[name]} if name in figures else {}
@@ -170,68 +85,62 @@ def sections_of(
     ]  # fmt: skip
 
 
-def summarise(analysis: Mapping[str, Any]) -> list[str]:
+def summarise(analysis: InjuryAnalysis) -> list[str]:
     """Return the outcome in sentences."""
-    level = str(analysis["limit"]["level"])
-    scenarios = analysis["scenarios"]
-    first = scenarios[REFERENCE]["at_least"][level]
+    level = str(analysis.limit.level)
+    scenarios = analysis.scenarios
+    first = scenarios[REFERENCE].at_least[level]
     lines = [f"Of {FEW:,.0f} impacts {_count(first)} leave a head injury of AIS {level} or worse."]
-    for name, entry in scenarios.items():
-        if name == REFERENCE:
+    for entry in scenarios.values():
+        if entry.difference is None:
             continue
         lines.append(
-            f"{capital(entry['title'])}: {_count(entry['at_least'][level])}, "
-            f"{_changed(entry['difference'][level])}."
+            f"{capital(entry.title)}: {_count(entry.at_least[level])}, "
+            f"{_changed(entry.difference[level])}."
         )
     return lines
 
 
-def _changed(change: Mapping[str, float | None]) -> str:
+def _changed(change: Change) -> str:
     """Return the change in numbers of impacts."""
-    value, low, high, relative = (change[k] for k in ("value", "low", "high", "relative"))
-    if not value:
+    if not change.value or change.low <= 0.0 <= change.high:
         return "no difference distinguishable from zero"
-    verb = "fewer" if value < 0.0 else "more"
-    percentage = "" if relative is None else f" ({100.0 * relative:+.0f} %)"
-    if low is None or high is None:
-        return f"{_count({'value': abs(value), 'low': None, 'high': None})} {verb}{percentage}"
-    if low <= 0.0 <= high:
-        return "no difference distinguishable from zero"
-    ends = sorted((abs(low), abs(high)))
-    size = {"value": abs(value), "low": ends[0], "high": ends[1]}
-    return f"{_count(size)} {verb}{percentage}"
+    verb = "fewer" if change.value < 0.0 else "more"
+    known = math.isfinite(change.relative)
+    percentage = f" ({100.0 * change.relative:+.0f} %)" if known else ""
+    low, high = sorted((abs(change.low), abs(change.high)))
+    return f"{_count(Estimate(abs(change.value), low, high))} {verb}{percentage}"
 
 
-def _count(estimate: Mapping[str, float | None]) -> str:
+def _count(estimate: Estimate) -> str:
     """Return how many in a thousand, with the interval."""
     shown = []
-    for key in ("value", "low", "high"):
-        side = estimate[key]
-        count = float("nan") if side is None else FEW * side
+    for side in (estimate.value, estimate.low, estimate.high):
+        count = FEW * side
         shown.append(f"{count:,.0f}" if abs(count) >= 10.0 else f"{count:.1f}")
     value, low, high = (text.replace("-0.0", "0.0").replace("nan", "–") for text in shown)
-    return value if "–" in (low, high) else f"{value} ({low} to {high})"
+    return f"{value} ({low} to {high})" if estimate.has_interval else value
 
 
-def _whole(probability: float | None) -> str:
+def _whole(probability: float) -> str:
     """Return a probability in whole per cent, a dash where it is unknown."""
-    return "–" if probability is None else f"{100.0 * probability:.0f}"
+    return f"{100.0 * probability:.0f}" if math.isfinite(probability) else "–"
 
 
-def _spread(estimate: Mapping[str, float | None]) -> str:
+def _spread(estimate: Estimate) -> str:
     """Return a probability with half its interval."""
-    value, low, high = (estimate[key] for key in ("value", "low", "high"))
-    if value is None:
+    value, low, high = (100.0 * v for v in (estimate.value, estimate.low, estimate.high))
+    if not math.isfinite(value):
         return "–"
-    if low is None or high is None:
-        return f"{100.0 * value:.1f} %"
-    if low <= 0.0 or high >= 1.0:
+    if not estimate.has_interval:
+        return f"{value:.1f} %"
+    if low <= 0.0 or high >= 100.0:
         # An interval that ends at a border is no half on either side.
-        return f"{100.0 * value:.1f} ({100.0 * low:.1f} to {100.0 * high:.1f}) %"
-    return f"{100.0 * value:.1f} ± {50.0 * (high - low):.1f} %"
+        return f"{value:.1f} ({low:.1f} to {high:.1f}) %"
+    return f"{value:.1f} ± {0.5 * (high - low):.1f} %"
 
 
-def _by_level(caption: str, columns: Mapping[str, Mapping[str, Any]]) -> Table:
+def _by_level(caption: str, columns: Mapping[str, Mapping[str, Estimate]]) -> Table:
     """Return a table of counts with a row an AIS level."""
     rows = [
         [f"AIS {level}+", *(_count(column[str(level)]) for column in columns.values())]
@@ -240,123 +149,111 @@ def _by_level(caption: str, columns: Mapping[str, Mapping[str, Any]]) -> Table:
     return Table(caption, ["", *columns], rows)
 
 
-def _outcome_tables(analysis: Mapping[str, Any]) -> list[Table]:
-    scenarios = analysis["scenarios"]
+def _outcome_tables(analysis: InjuryAnalysis) -> list[Table]:
+    scenarios = analysis.scenarios
     tables = [
         _by_level(
             f"Head injuries in {FEW:,.0f} impacts (95 % interval).",
-            {entry["title"]: entry["at_least"] for entry in scenarios.values()},
+            {entry.title: entry.at_least for entry in scenarios.values()},
         )
     ]
-    changed = {e["title"]: e["difference"] for e in scenarios.values() if "difference" in e}
+    changed = {e.title: e.difference for e in scenarios.values() if e.difference is not None}
     if changed:
         tables.append(
             _by_level("Difference from the reference scenario, with the same draws.", changed)
         )
-    if len(analysis["fronts"]) > 1:
-        level = analysis["limit"]["level"]
+    if len(analysis.fronts) > 1:
+        level = analysis.limit.level
         rows = [
-            [entry["title"], *(_count(e) for e in entry["by_front"].values())]
+            [entry.title, *(_count(e) for e in entry.by_front.values())]
             for entry in scenarios.values()
         ]
-        names = [f"{name} ({100.0 * share:.0f} %)" for name, share in analysis["fronts"].items()]
+        names = [f"{name} ({100.0 * share:.0f} %)" for name, share in analysis.fronts.items()]
         caption = f"AIS {level}+ in {FEW:,.0f} impacts by car front (share of the impacts)."
         tables.append(Table(caption, ["scenario", *names], rows))
     return tables
 
 
-def _observed_said(analysis: Mapping[str, Any]) -> list[str]:
-    observed = analysis["observed"]
-    if not observed["injuries"]:
+def _observed_said(analysis: InjuryAnalysis) -> list[str]:
+    observed = analysis.observed
+    if not observed.injuries:
         return ["The study file names no injuries of a real case."]
     lines = []
-    for entry in observed["injuries"]:
-        low, high = entry["central_90"]
+    for entry in observed.injuries:
+        low, high = entry.central_90
         by = ", ".join(
-            f"{_whole(value)} % by {analysis['functions'][name]['title']}"
-            for name, value in entry["by_function"].items()
+            f"{_whole(value)} % by {analysis.functions[name].title}"
+            for name, value in entry.by_function.items()
         )
-        label = capital(entry["label"])
+        label = capital(entry.label)
         lines.append(
-            f"{label} (AIS {entry['level']}): its probability was "
-            f"{percent(entry['probability'])}; in the central 90 % of the runs between "
+            f"{label} (AIS {entry.level}): its probability was "
+            f"{percent(entry.probability)}; in the central 90 % of the runs between "
             f"{_whole(low)} and {_whole(high)} %." + (f" By risk function: {by}." if by else "")
         )
-    if "all" in observed:
-        both = observed["all"]
+    if (both := observed.all) is not None:
         lines.append(
-            f"All of them together: {percent(both['independent'])} if each run's risks are "
-            f"independent, {percent(both['dependent'])} if they are fully dependent."
+            f"All of them together: {percent(both.independent)} if each run's risks are "
+            f"independent, {percent(both.dependent)} if they are fully dependent."
         )
     return lines
 
 
-def _halved_tables(analysis: Mapping[str, Any]) -> list[Table]:
-    speed = analysis["speed"]
+def _halved_tables(analysis: InjuryAnalysis) -> list[Table]:
+    speed = analysis.speed
     if not speed:
         return []
     rows = [
-        [name, f"{_whole(entry['now'])} %", interval(entry)]
-        for name, entry in speed["halved"].items()
+        [name, f"{_whole(entry.now)} %", interval(entry)] for name, entry in speed.halved.items()
     ]
     caption = (
         "The impact speed that halves the risk; the median of the case is "
-        f"{number(speed['reference_speed'])} km/h. '–': beyond the speeds of the study."
+        f"{number(speed.reference_speed)} km/h. '–': beyond the speeds of the study."
     )
     return [Table(caption, ["injury", "reference risk", "halved at [km/h] (95 %)"], rows)]
 
 
-def _function_table(analysis: Mapping[str, Any]) -> Table:
+def _function_table(analysis: InjuryAnalysis) -> Table:
     rows = [
-        [entry["title"], entry["label"],
-         *(_spread(entry["at_least"][str(k)]) if str(k) in entry["at_least"] else ""
+        [entry.title, entry.label,
+         *(_spread(entry.at_least[str(k)]) if str(k) in entry.at_least else ""
            for k in range(1, 7))]
-        for entry in analysis["functions"].values()
+        for entry in analysis.functions.values()
     ]  # fmt: skip
     head = ["risk function", "read", *(f"AIS {k}+" for k in range(1, 7))]
     return Table("Mean risk in the reference scenario (95 % interval of the mean).", head, rows)
 
 
-def _judged(analysis: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """Return the limit's ratings by scenario and injury."""
-    level = analysis["limit"]["level"]
-    return {
-        f"AIS {level}+ {style.words(words)}, {entry['title']}": judged
-        for entry in analysis["scenarios"].values()
-        for words, judged in entry["limit"].items()
-        if judged
-    }
-
-
-def _limit_said(analysis: Mapping[str, Any]) -> list[str]:
-    limit = analysis["limit"]
+def _limit_said(analysis: InjuryAnalysis) -> list[str]:
+    limit = analysis.limit
     lines = []
-    for entry in analysis["scenarios"].values():
-        said = f"{capital(entry['title'])}: " + (
-            f"{percent(entry['above_limit'])} of the runs exceed {limit['value']:g}"
+    for entry in analysis.scenarios.values():
+        said = f"{capital(entry.title)}: " + (
+            f"{percent(entry.above_limit)} of the runs exceed {limit.value:g}"
         )
-        judged = next(iter(entry["limit"].values()))
+        judged = next(iter(entry.limit.values()))
         if judged:
             said += (
-                f"; as a test of AIS {limit['level']}+ of the head the limit finds "
-                f"{percent(judged['sensitivity'])} of the injured; by these risk functions the "
-                f"optimal limit (Youden) is {number(judged['best'])}"
+                f"; as a test of AIS {limit.level}+ of the head the limit finds "
+                f"{percent(judged.sensitivity)} of the injured; by these risk functions the "
+                f"optimal limit (Youden) is {number(judged.best)}"
             )
         else:
             said += (
-                f"; as a test of AIS {limit['level']}+ of the head the limit cannot be rated, as "
+                f"; as a test of AIS {limit.level}+ of the head the limit cannot be rated, as "
                 "the runs do not differ"
             )
         lines.append(said + ".")
     return lines
 
 
-def _limit_table(analysis: Mapping[str, Any]) -> Table:
+def _limit_table(analysis: InjuryAnalysis) -> Table:
     rows = [
         [words,
-         *(_spread(judged[k]) for k in ("sensitivity", "specificity", "positive", "negative")),
-         interval(judged["area"], 2), number(judged["best"])]
-        for words, judged in _judged(analysis).items()
+         *map(_spread, (judged.sensitivity, judged.specificity, judged.positive,
+                        judged.negative)),
+         interval(judged.area, 2), number(judged.best)]
+        for words, judged in ratings_of(analysis).items()
     ]  # fmt: skip
     head = ["test of", "sensitivity", "specificity", "PPV (risk above)",
             "NPV (uninjured below)", "ROC area", "best limit"]  # fmt: skip
@@ -364,29 +261,29 @@ def _limit_table(analysis: Mapping[str, Any]) -> Table:
                  "their probability.", head, rows)  # fmt: skip
 
 
-def _association_table(entry: Mapping[str, Any]) -> Table:
-    found = entry["association"]
+def _association_table(entry: ScenarioOutcome) -> Table:
+    found = entry.association
     rows = [
         [style.words(name), interval(pair["spearman"], 2), interval(pair["kendall"], 2),
-         interval(found["odds"][name], 2) if found["odds"] else "–"]
-        for name, pair in found["rank"].items()
+         interval(found.odds[name], 2) if found.odds else "–"]
+        for name, pair in found.rank.items()
     ]  # fmt: skip
-    caption = f"{entry['title']}: {found['runs']:,} runs."
-    if len(found["levels"]) == 1:
-        caption += f" All outcomes are AIS {found['levels'][0]}, so there is no correlation."
-    elif found["constant"]:
-        caption += f" Constant: {', '.join(map(style.words, found['constant']))}."
-    if found["odds"]:
-        caption += f" The regression explains {100.0 * found['explained']:.0f} % (McFadden)."
+    caption = f"{entry.title}: {found.runs:,} runs."
+    if len(found.levels) == 1:
+        caption += f" All outcomes are AIS {found.levels[0]}, so there is no correlation."
+    elif found.constant:
+        caption += f" Constant: {', '.join(map(style.words, found.constant))}."
+    if found.explained is not None:
+        caption += f" The regression explains {100.0 * found.explained:.0f} % (McFadden)."
     return Table(caption, ["", "Spearman's rho", "Kendall's tau", "odds ratio per sd"], rows)
 
 
-def _speed_said(analysis: Mapping[str, Any]) -> list[str]:
-    speed = analysis["speed"]
+def _speed_said(analysis: InjuryAnalysis) -> list[str]:
+    speed = analysis.speed
     if not speed:
         return ["No curve: the study does not vary the impact speed, or has too few runs for one."]
     return [
-        f"From {speed['runs']:,} runs of all scenarios that change the speed alone. The published "
+        f"From {speed.runs:,} runs of all scenarios that change the speed alone. The published "
         "curves are for pedestrians of 15 years and more and for death or any severe injury."
     ]
 

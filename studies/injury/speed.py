@@ -1,7 +1,6 @@
 """Risk against impact speed, and the speed that halves it."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,6 +9,7 @@ from scipy import optimize
 
 from mcstudy.figures.style import words
 from mcstudy.sampling import seeds
+from studies.injury.numbers import HalvingSpeed, SpeedCurve, SpeedRisk
 from studies.injury.schema import REFERENCE, InjuryStudy
 from studies.paired_runs import batch_of
 
@@ -28,7 +28,7 @@ MIN_COUNT = 240
 
 def describe_speed(
     study: InjuryStudy, cases: pd.DataFrame, shares: Mapping[str, float]
-) -> dict[str, Any] | None:
+) -> SpeedRisk | None:
     """Return risks along the impact speed with 95 % bands, and the speeds that halve them.
 
     Cases of all scenarios that change only the speed are pooled: given the speed they are
@@ -46,9 +46,8 @@ def describe_speed(
 
     Returns
     -------
-    dict or None
-        ``speed`` (km/h), ``curves`` by name with ``risk``, ``low``, ``high``, and ``halved`` by
-        name; None where the study does not vary the speed.
+    SpeedRisk or None
+        None where the study does not vary the speed.
     """
     if SPEED not in study.inputs:
         return None
@@ -78,7 +77,7 @@ def describe_speed(
     reference = (held["scenario"] == REFERENCE).to_numpy()
     rng = seeds.generator(study.seed, seeds.BOOTSTRAP, 1)
     draws = [rng.integers(0, cells[0], cells[0]) for _ in range(RESAMPLES)]
-    found: dict[str, Any] = {"speed": middle, "runs": len(held), "curves": {}, "halved": {}}
+    curves, halved = {}, {}
     for name, risk in wanted.items():
         sums = np.zeros(cells)
         np.add.at(sums, (batch, place), weight * risk)
@@ -87,20 +86,20 @@ def describe_speed(
         curve = _curve(sums, weights, np.arange(cells[0]))
         resampled = np.stack([_curve(sums, weights, draw) for draw in draws])
         low, high = np.quantile(resampled, [0.025, 0.975], axis=0)
-        found["curves"][name] = {"risk": curve, "low": low, "high": high}
+        curves[name] = SpeedCurve(curve.tolist(), low.tolist(), high.tolist())
         speeds_half = np.array([_speed_at(middle, c, 0.5 * now) for c in resampled])
         half = _speed_at(middle, curve, 0.5 * now)
         held_half = speeds_half[np.isfinite(speeds_half)]
         # A zero risk cannot be halved.
         known = now > 0.0 and np.isfinite(half) and held_half.size > 0.9 * RESAMPLES
-        found["halved"][name] = {
-            "now": now,
-            "value": half if now > 0.0 else np.nan,
-            "low": float(np.quantile(held_half, 0.025)) if known else np.nan,
-            "high": float(np.quantile(held_half, 0.975)) if known else np.nan,
-        }
+        halved[name] = HalvingSpeed(
+            value=half if now > 0.0 else np.nan,
+            low=float(np.quantile(held_half, 0.025)) if known else np.nan,
+            high=float(np.quantile(held_half, 0.975)) if known else np.nan,
+            now=now,
+        )
     median = 3.6 * float(np.median(held.loc[reference, SPEED]))
-    return found | {"reference_speed": median}
+    return SpeedRisk(middle.tolist(), len(held), curves, halved, median)
 
 
 def _wanted(study: InjuryStudy, held: pd.DataFrame) -> dict[str, Array]:

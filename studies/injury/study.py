@@ -23,12 +23,14 @@ from mcstudy.studyfile.study_outputs import check_outputs
 from models.protocol import Model
 from studies.injury.analysis import CASES, analyse, outcomes_of
 from studies.injury.cells import Cell, cells_of
-from studies.injury.report import draw, sections_of, summarise
+from studies.injury.numbers import InjuryAnalysis
+from studies.injury.pictures import draw
+from studies.injury.report import sections_of, summarise
 from studies.injury.schema import InjuryStudy
 from studies.kind import Finished, StudyKind
 from studies.monte_carlo.design import sample_inputs
 from studies.paired_runs import PreparedCell, cell_folder, cell_runs, run_cells
-from studies.runs import check_failure_rate, load_study_model
+from studies.runs import RunEnds, check_failure_rate, load_study_model
 
 
 @dataclass(frozen=True)
@@ -43,20 +45,24 @@ class InjuryResults:
         Risk functions by name.
     cases : DataFrame
         Complete runs of all cells, with risks and a drawn AIS.
-    ended : dict
-        Status of the runs.
+    ended : RunEnds
+        How the runs ended.
     """
 
     model: Model
     functions: dict[str, RiskFunction]
     cases: pd.DataFrame
-    ended: dict[str, Any]
+    ended: RunEnds
 
 
-class Injury(StudyKind[InjuryStudy, list[PreparedCell], InjuryResults]):
+Done = Finished[InjuryStudy, InjuryResults, InjuryAnalysis]
+
+
+class Injury(StudyKind[InjuryStudy, list[PreparedCell], InjuryResults, InjuryAnalysis]):
     """Scenarios and car fronts through one model, with AIS outcomes of the runs."""
 
     schema = InjuryStudy
+    analysis = InjuryAnalysis
 
     def plan(self, study: InjuryStudy, folder: ResultsFolder) -> list[PreparedCell]:
         """Return the cells, each with its model and the values of every input."""
@@ -102,30 +108,27 @@ class Injury(StudyKind[InjuryStudy, list[PreparedCell], InjuryResults]):
         folder.write_frame(CASES, cases)
         return InjuryResults(model, functions, cases, ended)
 
-    def analyse(self, study: InjuryStudy, results: InjuryResults) -> dict[str, Any]:
+    def analyse(self, study: InjuryStudy, results: InjuryResults) -> InjuryAnalysis:
         """Return every number that the report prints."""
-        found = analyse(study, results.model, results.cases, results.functions)
-        return results.ended | found
+        return analyse(study, results.model, results.ended, results.cases, results.functions)
 
-    def subtitle(self, done: Finished[InjuryStudy, InjuryResults]) -> str:
+    def subtitle(self, done: Done) -> str:
         """Return the line below the report's title."""
-        scenarios, fronts = (len(done.analysis[key]) for key in ("scenarios", "fronts"))
+        scenarios, fronts = len(done.analysis.scenarios), len(done.analysis.fronts)
         return (
-            f"Injury study of {done.analysis['runs']:,} runs of the {done.study.model.name} model, "
+            f"Injury study of {done.analysis.runs:,} runs of the {done.study.model.name} model, "
             f"{scenarios} scenario(s), {fronts} car front(s), seed {done.study.seed}"
         )
 
-    def draw(self, done: Finished[InjuryStudy, InjuryResults]) -> dict[str, Any]:
+    def draw(self, done: Done) -> dict[str, Any]:
         """Return the figures by file name."""
         return draw(done.study, done.results.cases, done.analysis, done.results.functions)
 
-    def sections(
-        self, done: Finished[InjuryStudy, InjuryResults], figures: Mapping[str, Any]
-    ) -> Sequence[Section]:
+    def sections(self, done: Done, figures: Mapping[str, Any]) -> Sequence[Section]:
         """Return the sections of the report."""
         return sections_of(done.study, done.analysis, figures, done.results.functions)
 
-    def summarise(self, analysis: Mapping[str, Any]) -> list[str]:
+    def summarise(self, analysis: InjuryAnalysis) -> list[str]:
         """Return the risks of the scenarios."""
         return summarise(analysis)
 

@@ -1,7 +1,6 @@
 """Every number of a model comparison."""
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from itertools import combinations
 from typing import Any
 
@@ -10,13 +9,29 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mcstudy import units
-from mcstudy.agreement import compare, sources_of_disagreement, split_variance, without_rounding
+from mcstudy.agreement import (
+    Sources,
+    compare,
+    sources_of_disagreement,
+    split_variance,
+    without_rounding,
+)
 from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.results import check_failures, status_counts
 from mcstudy.sensitivity.given_data import MIN_RUNS, measure_given_data
 from mcstudy.statistics import Estimate, scale_of, varies
 from mcstudy.studyfile.study_outputs import check_outputs
 from models.protocol import Model, complete_status
+from studies.model_comparison.numbers import (
+    ApartRun,
+    ComparedModel,
+    ComparedOutput,
+    ComparisonAnalysis,
+    Disagreement,
+    Pair,
+    PublishedMethods,
+    TooFewRuns,
+)
 from studies.model_comparison.schema import ModelComparison
 from studies.paired_runs import batch_of
 from studies.runs import describe_ends
@@ -35,7 +50,7 @@ def analyse(
     runs: Mapping[str, pd.DataFrame],
     nominal: Mapping[str, Mapping[str, Any]],
     outputs: list[str],
-) -> dict[str, Any]:
+) -> ComparisonAnalysis:
     """Return every number that the report prints.
 
     Parameters
@@ -74,17 +89,8 @@ def analyse(
         for label, model in models.items()
     }
     words = complete_status(models[first])
-    held = complete.to_numpy(dtype=bool)
-    analysis: dict[str, Any] = describe_ends(study, everything, held, words) | {
-        "models": {
-            label: {"name": model.name, "version": model.version, "ignored": ignored[label],
-                    "status": status_counts(runs[label])}
-            for label, model in models.items()
-        },
-        "nominal": {label: dict(entry["outputs"]) for label, entry in nominal.items()},
-        "published": published_methods(study, models[first]),
-        "outputs": {},
-    }  # fmt: skip
+    ended = describe_ends(study, everything, complete.to_numpy(dtype=bool), words)
+    compared: dict[str, ComparedOutput | TooFewRuns] = {}
     parts = batch_of(study, runs[first])
     unit_of = {item.name: item.unit for item in models[first].outputs}
     for name in outputs:
@@ -95,32 +101,43 @@ def analyse(
             }
         )
         held = values.notna().all(axis=1).to_numpy()
-        entry: dict[str, Any] = {"unit": unit_of[name], "rows": int(held.sum())}
+        compared[name] = few = TooFewRuns(unit_of[name], int(held.sum()))
         if held.sum() >= MIN_PAIRS:
             table = values.to_numpy(dtype=float)
-            entry["variance"] = asdict(split_variance(table[held], parts[held]))
             # Squares of scaled values neither overflow nor vanish.
             scale = scale_of(table)
             scatter = (table[held] / scale).var(axis=1, ddof=1).mean()
-            entry["method_sd"] = scale * float(np.sqrt(scatter))
-            entry["spread"] = {
-                label: scale * float((values[label] / scale).std()) for label in models
-            }
-            entry["pairs"] = {
-                f"{one}/{two}": _pair(study, table[:, [i, j]], inputs, parts)
-                | {"unit": unit_of[name]}
-                for (i, one), (j, two) in combinations(enumerate(models), 2)
-            }
-        analysis["outputs"][name] = entry
-    analysis["compared"] = [name for name in outputs if "pairs" in analysis["outputs"][name]]
-    if not analysis["compared"]:
+            compared[name] = ComparedOutput(
+                **vars(few),
+                variance=split_variance(table[held], parts[held]),
+                method_sd=scale * float(np.sqrt(scatter)),
+                spread={label: scale * float((values[label] / scale).std()) for label in models},
+                pairs={
+                    f"{one}/{two}": _pair(study, few.unit, table[:, [i, j]], inputs, parts)
+                    for (i, one), (j, two) in combinations(enumerate(models), 2)
+                },
+            )
+    named = [name for name in outputs if isinstance(compared[name], ComparedOutput)]
+    if not named:
         raise StudyError(
             f"{', '.join(outputs)}: fewer than {MIN_PAIRS} runs have a value by every model"
         )
-    return analysis
+    return ComparisonAnalysis(
+        **vars(ended),
+        models={
+            label: ComparedModel(
+                model.name, model.version, ignored[label], status_counts(runs[label])
+            )
+            for label, model in models.items()
+        },
+        nominal={label: dict(entry["outputs"]) for label, entry in nominal.items()},
+        published=published_methods(study, models[first]),
+        outputs=compared,
+        compared=named,
+    )
 
 
-def published_methods(study: ModelComparison, model: Model) -> dict[str, Any]:
+def published_methods(study: ModelComparison, model: Model) -> dict[str, PublishedMethods]:
     """Return mean and standard deviation over the published simulations, by output in SI units.
 
     Raises
@@ -143,47 +160,65 @@ def published_methods(study: ModelComparison, model: Model) -> dict[str, Any]:
                 raise UserError(f"tables[{k}].units.{name}: {error}") from None
             scale = scale_of(values)
             scaled = values / scale
-            found[name] = {"unit": si[name], "methods": len(rows),
-                           "mean": scale * float(scaled.mean()),
-                           "sd": scale * float(scaled.std(ddof=1))}  # fmt: skip
+            mean, sd = scale * float(scaled.mean()), scale * float(scaled.std(ddof=1))
+            found[name] = PublishedMethods(si[name], len(rows), mean, sd)
     return found
 
 
 def _pair(
-    study: ModelComparison, values: Array, inputs: pd.DataFrame, parts: NDArray[np.int64]
-) -> dict[str, Any]:
-    """Return agreement, sources of disagreement and largest differences of two models."""
+    study: ModelComparison,
+    unit: str,
+    values: Array,
+    inputs: pd.DataFrame,
+    parts: NDArray[np.int64],
+) -> Pair:
+    """Return agreement, sources of disagreement and largest differences of two models.
+
+    Parameters
+    ----------
+    study : ModelComparison
+        Checked study file.
+    unit : str
+        Of the output.
+    values : (n, 2) array
+        Of the output by both models.
+    inputs : (n, d) DataFrame
+        Sampled inputs.
+    parts : (n,) array of int
+        Independent part of the design that each run belongs to.
+    """
     held = np.isfinite(values).all(axis=1)
     one = values[held, 0]
     two = without_rounding(one, values[held, 1])
     table = inputs[held].to_numpy(dtype=float)
-    found: dict[str, Any] = asdict(compare(one, two, parts[held]))
     gains, noise = sources_of_disagreement(one, two, table, study.seed)
-    found["breaking"] = {
-        "gains": dict(zip(inputs.columns, gains.tolist(), strict=True)),
-        "noise": noise,
-    }
     difference = two - one
+    disagreement = None
     if held.sum() >= MIN_RUNS:
         given = measure_given_data(table, difference, study.seed)
         shares = given.values["first_order"]
-        found["disagreement"] = {
-            "shares": {
-                name: Estimate(*shares[:, k].tolist()).as_dict()
-                for k, name in enumerate(inputs.columns)
+        disagreement = Disagreement(
+            {
+                name: Estimate(*shares[:, k].tolist())
+                for k, name in enumerate(map(str, inputs.columns))
             },
-            "noise": given.noise["first_order"],
-        }
-    if not varies(difference):
-        return found | {"most_apart": []}
-    worst = np.argsort(-np.abs(difference - difference.mean()), kind="stable")[:MAX_APART]
-    runs = np.flatnonzero(held)[worst]
-    found["most_apart"] = [
-        {
-            "run": int(run),
-            "values": values[run].tolist(),
-            "inputs": {k: float(v) for k, v in inputs.iloc[int(run)].items()},
-        }
-        for run in runs
-    ]
-    return found
+            given.noise["first_order"],
+        )
+    apart: list[ApartRun] = []
+    if varies(difference):
+        worst = np.argsort(-np.abs(difference - difference.mean()), kind="stable")[:MAX_APART]
+        apart = [
+            ApartRun(
+                run=int(run),
+                values=values[run].tolist(),
+                inputs={str(k): float(v) for k, v in inputs.iloc[int(run)].items()},
+            )
+            for run in np.flatnonzero(held)[worst]
+        ]
+    return Pair(
+        **vars(compare(one, two, parts[held])),
+        unit=unit,
+        breaking=Sources(dict(zip(map(str, inputs.columns), gains.tolist(), strict=True)), noise),
+        most_apart=apart,
+        disagreement=disagreement,
+    )

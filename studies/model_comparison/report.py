@@ -1,5 +1,6 @@
 """The report of a model comparison: model-form uncertainty, in text and figures."""
 
+import math
 from collections.abc import Mapping
 from itertools import combinations
 from typing import Any
@@ -10,9 +11,11 @@ import pandas as pd
 from mcstudy import units
 from mcstudy.figures import agreement, crash, style
 from mcstudy.report import Section, Table
+from mcstudy.statistics import Estimate, by_size
 from mcstudy.text import capital, interval, number, quantity, unit
 from models.protocol import Model, Scene
 from studies.failure_report import failure_map, failures_said, status_table
+from studies.model_comparison.numbers import ComparedOutput, ComparisonAnalysis, Pair
 from studies.model_comparison.schema import ModelComparison
 from studies.published_tables import as_table, compare_with_table
 
@@ -25,7 +28,7 @@ def draw(
     models: Mapping[str, Model],
     runs: Mapping[str, pd.DataFrame],
     nominal: Mapping[str, Mapping[str, Any]],
-    analysis: Mapping[str, Any],
+    analysis: ComparisonAnalysis,
 ) -> dict[str, Any]:
     """Return the figures by file name.
 
@@ -39,32 +42,31 @@ def draw(
         Table of runs by label.
     nominal : mapping
         Outputs and poses of the nominal run by label.
-    analysis : mapping
-        As in ``analysis.json``.
+    analysis : ComparisonAnalysis
+        Every number of the report.
     """
-    names = analysis["compared"]
-    unit_of = {name: analysis["outputs"][name]["unit"] for name in names}
+    reported = analysis.reported
+    unit_of = {name: entry.unit for name, entry in reported.items()}
     figures = failure_map(analysis)
     figures["variance"] = agreement.draw_variance(
-        {name: analysis["outputs"][name]["variance"] for name in names}
+        {name: entry.variance for name, entry in reported.items()}
     )
     for one, two in combinations(study.models, 2):
-        found = {name: analysis["outputs"][name]["pairs"][f"{one}/{two}"] for name in names}
+        found = analysis.pairs(one, two)
         values = {
             name: np.stack(
                 [runs[label][name].to_numpy(dtype=float) for label in (one, two)], axis=1
             )
-            for name in names
+            for name in reported
         }
         figures[f"pairs_{one}_{two}"] = agreement.draw_pairs(values, unit_of, (one, two), found)
         figures[f"breaking_{one}_{two}"] = agreement.draw_breaking(
-            {name: found[name]["breaking"] for name in names}
+            {name: pair.breaking for name, pair in found.items()}
         )
         si = {item.name: item.unit for item in models[one].inputs}
         along = {}
-        for name in names:
-            gains = found[name]["breaking"]["gains"]
-            key = max(gains, key=lambda k: gains[k] or 0.0)
+        for name, pair in found.items():
+            key = by_size(pair.breaking.gains)[0]
             spec = study.inputs[key]
             shown = runs[one][key].to_numpy(dtype=float) * units.factor(si[key], spec.unit)
             along[name] = (shown, style.label(key, spec.unit))
@@ -80,7 +82,7 @@ def draw(
 def sections_of(
     study: ModelComparison,
     models: Mapping[str, Model],
-    analysis: Mapping[str, Any],
+    analysis: ComparisonAnalysis,
     figures: Mapping[str, Any],
 ) -> list[Section]:
     """Return the sections of the report.
@@ -91,15 +93,15 @@ def sections_of(
         Checked study file.
     models : mapping
         Models by label.
-    analysis : mapping
-        As in ``analysis.json``.
+    analysis : ComparisonAnalysis
+        Every number of the report.
     figures : mapping
         Figures by file name.
     """
     sections = [
         Section(
             "Model-form uncertainty",
-            [_variance_said(name, analysis["outputs"][name]) for name in analysis["compared"]],
+            [_variance_said(name, entry) for name, entry in analysis.reported.items()],
             [_variance_table(analysis)],
             {"Variance split of each output over equally likely methods: effect of the inputs "
              "common to all methods, shift between methods, and interaction of inputs and "
@@ -107,15 +109,12 @@ def sections_of(
         )
     ]  # fmt: skip
     for one, two in combinations(study.models, 2):
-        pair = f"{one}/{two}"
+        found = analysis.pairs(one, two)
         sections.append(
             Section(
                 f"{capital(two)} against {one}",
-                [
-                    _pair_said(name, analysis["outputs"][name]["pairs"][pair], one, two)
-                    for name in analysis["compared"]
-                ],
-                [_pair_table(analysis, pair)],
+                [_pair_said(name, pair, one, two) for name, pair in found.items()],
+                [_pair_table(found, one, two)],
                 {"Above: every set of inputs by both models. Below: their difference against their "
                  "mean, with the mean difference and the limits between which 95 % of normal "
                  "differences lie; shaded, 95 % intervals of the lines. The widest 0.2 % at either "
@@ -125,9 +124,8 @@ def sections_of(
         sections.append(
             Section(
                 f"Sources of disagreement of {one} and {two}",
-                [_breaking_said(name, analysis["outputs"][name]["pairs"][pair])
-                 for name in analysis["compared"]],
-                [_disagreement_table(analysis, pair), _apart_table(study, analysis, pair, models)],
+                [_breaking_said(name, pair) for name, pair in found.items()],
+                [_disagreement_table(found), _apart_table(study, found, (one, two), models[one])],
                 {"Gain in rank correlation if the mean disagreement along an input is removed. "
                  "Grey: not above the gain of an unrelated input.":
                  figures[f"breaking_{one}_{two}"],
@@ -161,12 +159,14 @@ def sections_of(
     return sections
 
 
-def summarise(analysis: Mapping[str, Any]) -> list[Any]:
+def summarise(analysis: ComparisonAnalysis) -> list[Any]:
     """Return the command line's summary: the variance split and each pair's agreement."""
-    pairs = next(iter(analysis["outputs"][name]["pairs"] for name in analysis["compared"]))
     return [
-        *(_variance_said(name, analysis["outputs"][name]) for name in analysis["compared"]),
-        *(_pair_table(analysis, pair) for pair in pairs),
+        *(_variance_said(name, entry) for name, entry in analysis.reported.items()),
+        *(
+            _pair_table(analysis.pairs(one, two), one, two)
+            for one, two in combinations(analysis.models, 2)
+        ),
     ]
 
 
@@ -185,45 +185,41 @@ def _title(name: str) -> str:
     return capital(style.words(name))
 
 
-def _percent(entry: Mapping[str, Any]) -> str:
-    shown = [
-        "–" if entry[key] is None else f"{100.0 * entry[key]:.0f}".replace("-0", "0")
-        for key in ("value", "low", "high")
-    ]
-    if shown[0] == "–":
+def _percent(entry: Estimate) -> str:
+    if not math.isfinite(entry.value):
         return "–"
-    return f"{shown[0]} %" if "–" in shown else f"{shown[0]} % ({shown[1]} to {shown[2]})"
+    value, low, high = (
+        f"{100.0 * v:.0f}".replace("-0", "0") for v in (entry.value, entry.low, entry.high)
+    )
+    return f"{value} % ({low} to {high})" if entry.has_interval else f"{value} %"
 
 
-def _gain(value: float | None) -> str:
+def _gain(value: float) -> str:
     """Return a gain with two decimals, zero without a sign."""
-    if value is None:
-        return "–"
-    return f"{value:.2f}".replace("-0.00", "0.00")
+    return f"{value:.2f}".replace("-0.00", "0.00") if math.isfinite(value) else "–"
 
 
-def _variance_said(name: str, entry: Mapping[str, Any]) -> str:
-    split = entry["variance"]
-    if split["inputs"]["value"] is None:
+def _variance_said(name: str, entry: ComparedOutput) -> str:
+    split = entry.variance
+    if not math.isfinite(split.inputs.value):
         return f"{_title(name)} does not vary in any model."
     return (
-        f"{_title(name)}: of its variance {_percent(split['inputs'])} is due to the inputs alike "
-        f"in all models, {_percent(split['method'])} to the shift between methods, and "
-        f"{_percent(split['together'])} to the interaction of inputs and methods. For one set of "
+        f"{_title(name)}: of its variance {_percent(split.inputs)} is due to the inputs alike "
+        f"in all models, {_percent(split.method)} to the shift between methods, and "
+        f"{_percent(split.together)} to the interaction of inputs and methods. For one set of "
         "inputs the standard deviation of the methods is "
-        f"{quantity(entry['method_sd'], entry['unit'])}."
+        f"{quantity(entry.method_sd, entry.unit)}."
     )
 
 
-def _variance_table(analysis: Mapping[str, Any]) -> Table:
+def _variance_table(analysis: ComparisonAnalysis) -> Table:
     rows = []
-    for name in analysis["compared"]:
-        entry = analysis["outputs"][name]
-        split = entry["variance"]
+    for name, entry in analysis.reported.items():
+        split = entry.variance
         rows.append(
-            [style.words(name), unit(entry["unit"]) or "–",
-             *(_percent(split[key]) for key in ("inputs", "method", "together")),
-             number(entry["method_sd"]), f"{entry['rows']:,}"]
+            [style.words(name), unit(entry.unit) or "–",
+             *map(_percent, (split.inputs, split.method, split.together)),
+             number(entry.method_sd), f"{entry.rows:,}"]
         )  # fmt: skip
     head = ["output", "unit", "inputs", "method", "interaction", "sd of the methods", "runs"]
     return Table(
@@ -231,42 +227,36 @@ def _variance_table(analysis: Mapping[str, Any]) -> Table:
     )
 
 
-def _pair_said(name: str, found: Mapping[str, Any], one: str, two: str) -> str:
-    u = unit(found["unit"])
-    if found["spread"]["value"] == found["bias"]["value"] == 0.0:
+def _pair_said(name: str, found: Pair, one: str, two: str) -> str:
+    u = unit(found.unit)
+    if found.spread.value == found.bias.value == 0.0:
         return f"{_title(name)}: {one} and {two} give the same value in every run."
-    bias, low, high = found["bias"], found["lower"]["value"], found["upper"]["value"]
-    differs = bias["low"] is None or bias["low"] > 0.0 or bias["high"] < 0.0
-    side = "above" if bias["value"] > 0.0 else "below"
+    bias, low, high = found.bias, found.lower.value, found.upper.value
+    differs = not bias.low <= 0.0 <= bias.high
+    side = "above" if bias.value > 0.0 else "below"
     shift = (
-        f"{two} lies {number(abs(bias['value']))} {u} {side} {one} on average".replace("  ", " ")
+        f"{two} lies {number(abs(bias.value))} {u} {side} {one} on average".replace("  ", " ")
         if differs
         else f"{two} and {one} have no clear mean difference"
     )
     return (
         f"{_title(name)}: {shift}; 95 % of the differences lie between {number(low)} and "
-        f"{quantity(high, found['unit'])}. "
+        f"{quantity(high, found.unit)}. "
         + (
-            f"Rank correlation {interval(found['rank_correlation'], 2)}."
-            if found["rank_correlation"]["value"] is not None
+            f"Rank correlation {interval(found.rank_correlation, 2)}."
+            if math.isfinite(found.rank_correlation.value)
             else "There is no rank correlation where one of them does not vary."
         )
     )
 
 
-def _pair_table(analysis: Mapping[str, Any], pair: str) -> Table:
-    rows = []
-    for name in analysis["compared"]:
-        entry = analysis["outputs"][name]
-        found = entry["pairs"][pair]
-        rows.append(
-            [style.label(name, entry["unit"]), f"{found['pairs']:,}",
-             *(interval(found[key], 2) for key in ("rank_correlation", "correlation",
-                                                   "concordance")),
-             interval(found["bias"]),
-             f"{number(found['lower']['value'])} to {number(found['upper']['value'])}"]
-        )  # fmt: skip
-    one, two = pair.split("/")
+def _pair_table(found: Mapping[str, Pair], one: str, two: str) -> Table:
+    rows = [
+        [style.label(name, pair.unit), f"{pair.pairs:,}",
+         *(interval(e, 2) for e in (pair.rank_correlation, pair.correlation, pair.concordance)),
+         interval(pair.bias), f"{number(pair.lower.value)} to {number(pair.upper.value)}"]
+        for name, pair in found.items()
+    ]  # fmt: skip
     head = ["output", "pairs", "rank correlation", "Pearson", "concordance", "mean difference",
             "limits"]  # fmt: skip
     return Table(
@@ -277,14 +267,14 @@ def _pair_table(analysis: Mapping[str, Any], pair: str) -> Table:
     )
 
 
-def _breaking_said(name: str, found: Mapping[str, Any]) -> str:
-    gains, noise = found["breaking"]["gains"], found["breaking"]["noise"]
-    rank = found["rank_correlation"]["value"]
-    if rank is None:
+def _breaking_said(name: str, found: Pair) -> str:
+    gains, noise = found.breaking.gains, found.breaking.noise
+    rank = found.rank_correlation.value
+    if not math.isfinite(rank):
         return f"{_title(name)}: there is no rank correlation to analyse."
-    if found["spread"]["value"] == 0.0:
+    if found.spread.value == 0.0:
         return f"{_title(name)}: no input reduces the rank correlation of {rank:.2f}."
-    order = [key for key in sorted(gains, key=lambda k: -gains[k]) if gains[key] > noise]
+    order = [key for key in by_size(gains) if gains[key] > noise]
     if not order:
         return (
             f"{_title(name)}: no single input reduces the rank correlation of {rank:.2f}; the "
@@ -297,26 +287,21 @@ def _breaking_said(name: str, found: Mapping[str, Any]) -> str:
     )
 
 
-def _disagreement_table(analysis: Mapping[str, Any], pair: str) -> Table:
-    names = analysis["compared"]
-    inputs = list(analysis["outputs"][names[0]]["pairs"][pair]["breaking"]["gains"])
+def _disagreement_table(found: Mapping[str, Pair]) -> Table:
     rows = []
-    for key in inputs:
+    for key in next(iter(found.values())).breaking.gains:
         row = [style.words(key)]
-        for name in names:
-            found = analysis["outputs"][name]["pairs"][pair]
-            row.append(_gain(found["breaking"]["gains"][key]))
-            shares = found.get("disagreement", {}).get("shares")
-            row.append(_percent(shares[key]) if shares else "–")
+        for pair in found.values():
+            row.append(_gain(pair.breaking.gains[key]))
+            row.append(_percent(pair.disagreement.shares[key]) if pair.disagreement else "–")
         rows.append(row)
     last = ["noise line"]
-    for name in names:
-        found = analysis["outputs"][name]["pairs"][pair]
-        last.append(_gain(found["breaking"]["noise"]))
-        noise = found.get("disagreement", {}).get("noise")
-        last.append("–" if noise is None else f"{100.0 * noise:.0f} %")
+    for pair in found.values():
+        noise = pair.disagreement.noise if pair.disagreement else math.nan
+        last.append(_gain(pair.breaking.noise))
+        last.append(f"{100.0 * noise:.0f} %" if math.isfinite(noise) else "–")
     head = ["input"]
-    for name in names:
+    for name in found:
         head += [f"{style.words(name)}: gain", f"{style.words(name)}: share of the difference"]
     return Table(
         "Gain in rank correlation by input, and first-order share of the variance of the "
@@ -327,25 +312,22 @@ def _disagreement_table(analysis: Mapping[str, Any], pair: str) -> Table:
 
 
 def _apart_table(
-    study: ModelComparison, analysis: Mapping[str, Any], pair: str, models: Mapping[str, Model]
+    study: ModelComparison, found: Mapping[str, Pair], labels: tuple[str, str], model: Model
 ) -> Table:
-    names = analysis["compared"]
     shown = []
-    for name in names:
-        gains = analysis["outputs"][name]["pairs"][pair]["breaking"]["gains"]
-        shown += sorted(gains, key=lambda k: -(gains[k] or 0.0))[:NAMED]
+    for pair in found.values():
+        shown += by_size(pair.breaking.gains)[:NAMED]
     columns = list(dict.fromkeys(shown))
-    si = {item.name: item.unit for item in models[pair.split("/")[0]].inputs}
+    si = {item.name: item.unit for item in model.inputs}
     rows = []
-    for name in names:
-        for entry in analysis["outputs"][name]["pairs"][pair]["most_apart"]:
-            values = [number(value) for value in entry["values"]]
+    for name, pair in found.items():
+        for entry in pair.most_apart:
+            values = [number(value) for value in entry.values]
             point = [
-                number(entry["inputs"][k] * units.factor(si[k], study.inputs[k].unit))
-                for k in columns
+                number(entry.inputs[k] * units.factor(si[k], study.inputs[k].unit)) for k in columns
             ]
-            rows.append([style.words(name), str(entry["run"]), *values, *point])
-    head = ["output", "run", *pair.split("/"),
+            rows.append([style.words(name), str(entry.run), *values, *point])
+    head = ["output", "run", *labels,
             *(style.label(k, study.inputs[k].unit) for k in columns)]  # fmt: skip
     return Table("Runs with the largest differences beyond the mean difference.", head, rows)
 
@@ -353,33 +335,33 @@ def _apart_table(
 def _published(
     study: ModelComparison,
     models: Mapping[str, Model],
-    analysis: Mapping[str, Any],
+    analysis: ComparisonAnalysis,
     pictures: Mapping[str, Any],
 ) -> Section:
     si = {item.name: item.unit for model in models.values() for item in model.outputs}
-    ours = {f"{label}, nominal": analysis["nominal"][label] for label in study.models}
+    ours = {f"{label}, nominal": analysis.nominal[label] for label in study.models}
     tables = [as_table(compare_with_table(table, ours, si)) for table in study.tables]
     lines = ["Our rows are the models' nominal runs; none of them was set up for this study."]
-    for name, entry in analysis["published"].items():
-        mine = analysis["outputs"].get(name, {}).get("method_sd")
+    for name, entry in analysis.published.items():
+        mine = analysis.reported.get(name)
         said = (
-            f"{_title(name)}: the {entry['methods']} published methods have a standard deviation "
-            f"of {quantity(entry['sd'], entry['unit'])}"
+            f"{_title(name)}: the {entry.methods} published methods have a standard deviation "
+            f"of {quantity(entry.sd, entry.unit)}"
         )
-        if entry["mean"]:
-            said += f" ({number(100.0 * entry['sd'] / abs(entry['mean']), 2)} % of their mean)"
+        if entry.mean:
+            said += f" ({number(100.0 * entry.sd / abs(entry.mean), 2)} % of their mean)"
         said += " for one set of inputs"
         if mine is not None:
-            said += f"; ours, over all sets of inputs, have {quantity(mine, entry['unit'])}"
+            said += f"; ours, over all sets of inputs, have {quantity(mine.method_sd, entry.unit)}"
         lines.append(f"{said}.")
     return Section("Comparison with the published methods", lines, tables, dict(pictures))
 
 
-def _models_said(analysis: Mapping[str, Any]) -> list[str]:
+def _models_said(analysis: ComparisonAnalysis) -> list[str]:
     lines = []
-    for label, entry in analysis["models"].items():
-        line = f"{capital(label)}: model {entry['name']}, version {entry['version']}."
-        for key, reason in entry["ignored"].items():
+    for label, entry in analysis.models.items():
+        line = f"{capital(label)}: model {entry.name}, version {entry.version}."
+        for key, reason in entry.ignored.items():
             line += f" It ignores {style.words(key)}: {reason}."
         lines.append(line)
     return lines

@@ -20,6 +20,7 @@ from mcstudy.studyfile.study_outputs import check_outputs, report_outputs
 from models.protocol import Model, Run
 from studies.kind import Finished, StudyKind
 from studies.model_comparison.analysis import analyse, published_methods
+from studies.model_comparison.numbers import ComparisonAnalysis
 from studies.model_comparison.report import draw, sections_of, summarise
 from studies.model_comparison.schema import ModelComparison
 from studies.monte_carlo.design import sample_inputs
@@ -50,10 +51,16 @@ class ComparisonResults:
     nominal: dict[str, dict[str, Any]]
 
 
-class Comparison(StudyKind[ModelComparison, list[PreparedCell], ComparisonResults]):
+Done = Finished[ModelComparison, ComparisonResults, ComparisonAnalysis]
+
+
+class Comparison(
+    StudyKind[ModelComparison, list[PreparedCell], ComparisonResults, ComparisonAnalysis]
+):
     """The same inputs through two or more models."""
 
     schema = ModelComparison
+    analysis = ComparisonAnalysis
 
     def plan(self, study: ModelComparison, folder: ResultsFolder) -> list[PreparedCell]:
         """Return the cells, each with its model and the values of every input."""
@@ -103,12 +110,12 @@ class Comparison(StudyKind[ModelComparison, list[PreparedCell], ComparisonResult
             {label: cell_folder(folder, label).read_json(NOMINAL) for label in study.models},
         )
 
-    def analyse(self, study: ModelComparison, results: ComparisonResults) -> dict[str, Any]:
+    def analyse(self, study: ModelComparison, results: ComparisonResults) -> ComparisonAnalysis:
         """Return every number that the report prints."""
         outputs = compared_outputs(study, results.models)
         return analyse(study, results.models, results.runs, results.nominal, outputs)
 
-    def subtitle(self, done: Finished[ModelComparison, ComparisonResults]) -> str:
+    def subtitle(self, done: Done) -> str:
         """Return the line below the report's title."""
         named = ", ".join(f"{label} ({model.name})" for label, model in done.results.models.items())
         return (
@@ -116,19 +123,17 @@ class Comparison(StudyKind[ModelComparison, list[PreparedCell], ComparisonResult
             f"{named}, seed {done.study.seed}"
         )
 
-    def draw(self, done: Finished[ModelComparison, ComparisonResults]) -> dict[str, Any]:
+    def draw(self, done: Done) -> dict[str, Any]:
         """Return the figures by file name."""
         return draw(
             done.study, done.results.models, done.results.runs, done.results.nominal, done.analysis
         )
 
-    def sections(
-        self, done: Finished[ModelComparison, ComparisonResults], figures: Mapping[str, Any]
-    ) -> Sequence[Section]:
+    def sections(self, done: Done, figures: Mapping[str, Any]) -> Sequence[Section]:
         """Return the sections of the report."""
         return sections_of(done.study, done.results.models, done.analysis, figures)
 
-    def summarise(self, analysis: Mapping[str, Any]) -> list[str]:
+    def summarise(self, analysis: ComparisonAnalysis) -> list[str]:
         """Return the agreement of the models."""
         return summarise(analysis)
 

@@ -6,20 +6,74 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mcstudy import units
-from mcstudy.figures import style
+from mcstudy import statistics, units
+from mcstudy.figures import distributions, relations, style
 from mcstudy.report import Section, Table
+from mcstudy.statistics import Distribution, TooFew
 from mcstudy.text import capital, interval, number, percent, quantity, unit
-from models.protocol import Model
-from studies.failure_report import failures_said, status_table
+from models.protocol import Model, complete_status
+from studies.failure_report import failure_map, failures_said, status_table
+from studies.monte_carlo.analysis import MonteCarloAnalysis, marks_of
 from studies.monte_carlo.schema import MonteCarloStudy
+
+
+def draw(
+    study: MonteCarloStudy, model: Model, runs: pd.DataFrame, analysis: MonteCarloAnalysis
+) -> dict[str, Any]:
+    """Return the study's figures by file name.
+
+    Parameters
+    ----------
+    study : MonteCarloStudy
+        Checked study file.
+    model : Model
+        Model of the runs.
+    runs : DataFrame
+        Table of the runs.
+    analysis : MonteCarloAnalysis
+        Every number of the report.
+    """
+    complete = runs[runs["status"].isin(complete_status(model))]
+    unit_of = {item.name: item.unit for item in model.outputs}
+    # An output without a value in any run is not drawn.
+    wanted = {name: unit_of[name] for name in analysis.convergence}
+    marks = marks_of(study, model)
+    figures = failure_map(analysis)
+    if not wanted:
+        return figures
+    figures |= {
+        "distributions": distributions.draw_distributions(
+            complete, wanted, marks, analysis.outputs
+        ),
+        "rank_correlation": relations.draw_correlations(
+            pd.DataFrame(analysis.rank_correlation), analysis.rank_correlation_noise
+        ),
+    }
+    steps = {name: table for name, table in analysis.convergence.items() if table}
+    if steps:
+        figures["convergence"] = relations.draw_convergence(steps, wanted)
+    speed = complete["impact_speed"].to_numpy() if "impact_speed" in study.inputs else np.zeros(0)
+    if statistics.varies(speed):
+        shown = complete.assign(impact_speed=3.6 * complete["impact_speed"])
+        figures["impact_speed"] = relations.draw_against_input(
+            shown, "impact_speed", "impact speed [km/h]", wanted, marks
+        )
+    if {"throw_distance", "wad"} <= set(wanted):
+        point = {
+            name: mark.value for name, items in marks.items() for mark in items
+            if mark.kind == "observed"
+        }  # fmt: skip
+        figures["throw_and_wad"] = relations.draw_joint(
+            complete, ("throw_distance", "m"), ("wad", "m"), point
+        )
+    return figures
 
 
 def sections_of(
     study: MonteCarloStudy,
     model: Model,
     runs: pd.DataFrame,
-    analysis: Mapping[str, Any],
+    analysis: MonteCarloAnalysis,
     figures: Mapping[str, Any],
 ) -> list[Section]:
     """Return the sections of the report.
@@ -32,8 +86,8 @@ def sections_of(
         Model of the runs.
     runs : DataFrame
         Table of the runs.
-    analysis : mapping
-        As in ``analysis.json``.
+    analysis : MonteCarloAnalysis
+        Every number of the report.
     figures : mapping
         Figures by file name.
     """
@@ -67,18 +121,18 @@ def sections_of(
     ]  # fmt: skip
 
 
-def summarise(analysis: Mapping[str, Any]) -> list[Table]:
+def summarise(analysis: MonteCarloAnalysis) -> list[Table]:
     """Return the distributions of the reported outputs as a short table."""
     rows = []
-    for name in analysis["rank_correlation"]:
-        entry = analysis["outputs"][name]
+    for name in analysis.rank_correlation:
+        entry = analysis.outputs[name]
         known = (
-            [interval(entry["mean"]),
-             *(number(entry["quantiles"][p]["value"]) for p in ("0.05", "0.5", "0.95"))]
-            if "mean" in entry
+            [interval(entry.mean),
+             *(number(entry.quantiles[p].value) for p in ("0.05", "0.5", "0.95"))]
+            if isinstance(entry, Distribution)
             else ["–"] * 4
         )  # fmt: skip
-        rows.append([name, entry["unit"], *known])
+        rows.append([name, entry.unit, *known])
     head = ["output", "unit", "mean (95 % interval)", "5 %", "median", "95 %"]
     return [Table("", head, rows)]
 
@@ -87,66 +141,64 @@ def _title(name: str) -> str:
     return capital(style.words(name))
 
 
-def _summary(study: MonteCarloStudy, model: Model, analysis: Mapping[str, Any]) -> list[str]:
+def _summary(study: MonteCarloStudy, model: Model, analysis: MonteCarloAnalysis) -> list[str]:
     unit_of = {item.name: item.unit for item in model.outputs}
-    lines = [
-        _distribution(name, analysis["outputs"][name]) for name in analysis["rank_correlation"]
-    ]
-    for name, entries in analysis["exceedance"].items():
+    lines = [_distribution(name, analysis.outputs[name]) for name in analysis.rank_correlation]
+    for name, entries in analysis.exceedance.items():
         lines += [
-            f"{_title(name)} exceeds {quantity(e['value'], unit_of[name])} ({e['label']}) in "
-            f"{percent(e['probability_above'])} of the runs."
+            f"{_title(name)} exceeds {quantity(e.value, unit_of[name])} ({e.label}) in "
+            f"{percent(e.probability_above)} of the runs."
             for e in entries
         ]
     return lines
 
 
-def _distribution(name: str, entry: Mapping[str, Any]) -> str:
+def _distribution(name: str, entry: Distribution | TooFew) -> str:
     """Return a sentence on the distribution of an output."""
-    title, count = _title(name), entry["n"]
-    if "quantiles" not in entry:
+    title, count = _title(name), entry.n
+    if not isinstance(entry, Distribution):
         return f"{title}: {'only one run' if count else 'no run'} has a value."
-    q, u = entry["quantiles"], unit(entry["unit"])
-    if entry["sd"]["value"] == 0.0:
-        held = " that have a value" if entry["undefined"] else ""
-        value = f"{number(q['0.5']['value'], 4)} {u}".strip()
+    q, u = entry.quantiles, unit(entry.unit)
+    if entry.sd.value == 0.0:
+        held = " that have a value" if entry.undefined else ""
+        value = f"{number(q['0.5'].value, 4)} {u}".strip()
         return f"{title} does not vary: it is {value} in all {count:,} runs{held}."
     return (
         f"{title}: median {' '.join((interval(q['0.5']), u)).strip()}; nine runs in ten "
-        f"lie between {number(q['0.05']['value'])} and "
-        f"{' '.join((number(q['0.95']['value']), u)).strip()}."
+        f"lie between {number(q['0.05'].value)} and "
+        f"{' '.join((number(q['0.95'].value), u)).strip()}."
     )
 
 
-def _accident(analysis: Mapping[str, Any], model: Model) -> list[str]:
+def _accident(analysis: MonteCarloAnalysis, model: Model) -> list[str]:
     unit_of = {item.name: item.unit for item in model.outputs}
     lines = []
-    for name, entries in analysis["observed"].items():
+    for name, entries in analysis.observed.items():
         for e in entries:
-            where = "inside" if e["inside_central_90"] else "OUTSIDE"
+            where = "inside" if e.inside_central_90 else "OUTSIDE"
             lines.append(
-                f"{_title(name)}: the observed {quantity(e['value'], unit_of[name])} "
-                f"({e['label']}) lies {where} the central 90 % of the prediction, at its "
-                f"{100.0 * e['percentile']:.0f} % point."
+                f"{_title(name)}: the observed {quantity(e.value, unit_of[name])} "
+                f"({e.label}) lies {where} the central 90 % of the prediction, at its "
+                f"{100.0 * e.percentile:.0f} % point."
             )
     return lines or ["The study file names no observed values."]
 
 
-def _output_table(study: MonteCarloStudy, model: Model, analysis: Mapping[str, Any]) -> Table:
+def _output_table(study: MonteCarloStudy, model: Model, analysis: MonteCarloAnalysis) -> Table:
     rows = []
     for item in model.outputs:
-        entry = analysis["outputs"][item.name]
-        if "mean" not in entry:
+        entry = analysis.outputs[item.name]
+        if not isinstance(entry, Distribution):
             continue
-        q = entry["quantiles"]
+        q = entry.quantiles
         rows.append(
             [
                 item.name,
                 unit(item.unit) or "–",
-                interval(entry["mean"]),
-                number(entry["sd"]["value"]),
-                *(number(q[p]["value"]) for p in ("0.05", "0.5", "0.95")),
-                str(entry["undefined"]),
+                interval(entry.mean),
+                number(entry.sd.value),
+                *(number(q[p].value) for p in ("0.05", "0.5", "0.95")),
+                str(entry.undefined),
             ]
         )
     head = ["output", "unit", "mean (95 % interval)", "sd", "5 %", "median", "95 %", "undefined"]

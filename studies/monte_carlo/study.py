@@ -6,27 +6,27 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mcstudy import statistics, units
-from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import Workers
-from mcstudy.figures import distributions, relations
 from mcstudy.report import Section, Table
 from mcstudy.studyfile.identity import numbers_digest
-from mcstudy.studyfile.study_outputs import check_outputs, report_outputs
-from models.protocol import Model, complete_status
-from studies.failure_report import failure_map
+from mcstudy.studyfile.study_outputs import report_outputs
+from models.protocol import Model
 from studies.kind import Finished, StudyKind
+from studies.monte_carlo.analysis import MonteCarloAnalysis, analyse, marks_of
 from studies.monte_carlo.design import sample_inputs
-from studies.monte_carlo.report import sections_of, summarise
+from studies.monte_carlo.report import draw, sections_of, summarise
 from studies.monte_carlo.schema import MonteCarloStudy
-from studies.runs import ModelRuns, RunPlan, columns_of, describe_runs, load_study_model, run_rows
+from studies.runs import ModelRuns, RunPlan, columns_of, load_study_model, run_rows
+
+Done = Finished[MonteCarloStudy, ModelRuns, MonteCarloAnalysis]
 
 
-class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns]):
+class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns, MonteCarloAnalysis]):
     """Independent or stratified samples of the inputs of one model."""
 
     schema = MonteCarloStudy
+    analysis = MonteCarloAnalysis
 
     def plan(self, study: MonteCarloStudy, folder: ResultsFolder) -> RunPlan:
         """Return the model and the sampled values of its inputs."""
@@ -75,11 +75,11 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns]):
         runs = folder.runs(columns_of(model))
         return ModelRuns(model, runs[runs["run"] < study.design.n])
 
-    def analyse(self, study: MonteCarloStudy, results: ModelRuns) -> dict[str, Any]:
+    def analyse(self, study: MonteCarloStudy, results: ModelRuns) -> MonteCarloAnalysis:
         """Return every number that the report prints."""
         return analyse(study, results.model, results.runs)
 
-    def subtitle(self, done: Finished[MonteCarloStudy, ModelRuns]) -> str:
+    def subtitle(self, done: Done) -> str:
         """Return the line below the report's title."""
         return (
             f"Monte Carlo study of {len(done.results.runs):,} runs of the "
@@ -87,159 +87,23 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns]):
             f"seed {done.study.seed}"
         )
 
-    def draw(self, done: Finished[MonteCarloStudy, ModelRuns]) -> dict[str, Any]:
+    def draw(self, done: Done) -> dict[str, Any]:
         """Return the figures by file name."""
         return draw(done.study, done.results.model, done.results.runs, done.analysis)
 
-    def sections(
-        self, done: Finished[MonteCarloStudy, ModelRuns], figures: Mapping[str, Any]
-    ) -> Sequence[Section]:
+    def sections(self, done: Done, figures: Mapping[str, Any]) -> Sequence[Section]:
         """Return the sections of the report."""
         return sections_of(
             done.study, done.results.model, done.results.runs, done.analysis, figures
         )
 
-    def summarise(self, analysis: Mapping[str, Any]) -> list[Table]:
+    def summarise(self, analysis: MonteCarloAnalysis) -> list[Table]:
         """Return the distributions of the reported outputs."""
         return summarise(analysis)
 
     def independent_rows(self, runs: pd.DataFrame, folder: ResultsFolder) -> pd.DataFrame:
         """Return all runs: each is an independent draw."""
         return runs
-
-
-def marks_of(study: MonteCarloStudy, model: Model) -> dict[str, list[distributions.Mark]]:
-    """Return the study's references by output, in the model's units.
-
-    Raises
-    ------
-    UserError
-        If an output or a unit does not fit the model.
-    """
-    known = {item.name: item for item in model.outputs}
-    marks: dict[str, list[distributions.Mark]] = {}
-    for k, entry in enumerate(study.report.references):
-        place = f"report.references[{k}]"
-        check_outputs([entry.output], model, place)
-        try:
-            value = entry.value * units.factor(entry.unit, known[entry.output].unit)
-        except ValueError as error:
-            raise UserError(f"{place}: {error}") from None
-        marks.setdefault(entry.output, []).append(
-            distributions.Mark(value, entry.label, entry.kind)
-        )
-    return marks
-
-
-def analyse(study: MonteCarloStudy, model: Model, runs: pd.DataFrame) -> dict[str, Any]:
-    """Return every number that the report prints.
-
-    Parameters
-    ----------
-    study : MonteCarloStudy
-        Checked study file.
-    model : Model
-        Model of the runs.
-    runs : DataFrame
-        Table of the runs.
-    """
-    ended, held = describe_runs(study, model, runs)
-    complete = runs[held]
-    groups = None if study.design.method == "monte-carlo" else complete["replicate"].to_numpy()
-    marks = marks_of(study, model)
-    sampled = list(study.inputs)
-    wanted = report_outputs(study, model)
-    analysis: dict[str, Any] = ended | {
-        "outputs": {},
-        "exceedance": {},
-        "observed": {},
-        "convergence": {},
-    }
-    for item in model.outputs:
-        values = complete[item.name].to_numpy(dtype=float)
-        analysis["outputs"][item.name] = {"unit": item.unit} | statistics.describe(values, groups)
-    for name in wanted:
-        values = complete[name].to_numpy(dtype=float)
-        finite = np.isfinite(values)
-        part, parts = values[finite], None if groups is None else groups[finite]
-        if part.size < 2:
-            continue
-        analysis["convergence"][name] = statistics.convergence(
-            values, lambda v: float(np.median(v))
-        )
-        for mark in marks.get(name, ()):
-            above = statistics.probability(part > mark.value, parts).as_dict()
-            entry = {"value": mark.value, "label": mark.label, "probability_above": above}
-            if mark.kind == "observed":
-                low, high = np.quantile(part, [0.05, 0.95])
-                entry["inside_central_90"] = bool(low <= mark.value <= high)
-                entry["percentile"] = float(np.mean(part <= mark.value))
-                analysis["observed"].setdefault(name, []).append(entry)
-            else:
-                analysis["exceedance"].setdefault(name, []).append(entry)
-    columns = complete[[*sampled, *wanted]].astype(float)
-    # Ranks of a column that differs by rounding alone are meaningless.
-    varying = columns.apply(lambda column: statistics.varies(column.to_numpy()))
-    ranks = columns.where(varying, axis="columns").corr("spearman")
-    table = ranks.loc[sampled, wanted]
-    analysis["rank_correlation"] = {
-        name: {k: float(v) for k, v in table[name].items()} for name in wanted
-    }
-    # |rho| of unrelated ranks stays below this in 95 of 100 cases.
-    analysis["rank_correlation_noise"] = float(1.96 / np.sqrt(max(len(complete) - 1, 1)))
-    return analysis
-
-
-def draw(
-    study: MonteCarloStudy, model: Model, runs: pd.DataFrame, analysis: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Return the study's figures by file name.
-
-    Parameters
-    ----------
-    study : MonteCarloStudy
-        Checked study file.
-    model : Model
-        Model of the runs.
-    runs : DataFrame
-        Table of the runs.
-    analysis : mapping
-        As in ``analysis.json``.
-    """
-    complete = runs[runs["status"].isin(complete_status(model))]
-    unit_of = {item.name: item.unit for item in model.outputs}
-    # An output without a value in any run is not drawn.
-    wanted = {name: unit_of[name] for name in analysis["convergence"]}
-    marks = marks_of(study, model)
-    figures = failure_map(analysis)
-    if not wanted:
-        return figures
-    figures |= {
-        "distributions": distributions.draw_distributions(
-            complete, wanted, marks, analysis["outputs"]
-        ),
-        "rank_correlation": relations.draw_correlations(
-            pd.DataFrame(analysis["rank_correlation"]), analysis["rank_correlation_noise"]
-        ),
-    }
-    steps = {name: table for name, table in analysis["convergence"].items() if table}
-    if steps:
-        figures["convergence"] = relations.draw_convergence(steps, wanted)
-    speed = complete["impact_speed"].to_numpy() if "impact_speed" in study.inputs else np.zeros(0)
-    if statistics.varies(speed):
-        shown = complete.assign(impact_speed=3.6 * complete["impact_speed"])
-        figures["impact_speed"] = relations.draw_against_input(
-            shown, "impact_speed", "impact speed [km/h]", wanted, marks
-        )
-    if {"throw_distance", "wad"} <= set(wanted):
-        point = {
-            name: mark.value for name, items in marks.items() for mark in items
-            if mark.kind == "observed"
-        }  # fmt: skip
-        figures["throw_and_wad"] = relations.draw_joint(
-            complete, ("throw_distance", "m"), ("wad", "m"), point
-        )
-    return figures
 
 
 def _keep_histories(

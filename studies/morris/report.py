@@ -7,10 +7,12 @@ from mcstudy.figures import screening, style
 from mcstudy.report import Section, Table
 from mcstudy.sampling.factors import DUMMY, PERTURBATION
 from mcstudy.sampling.morris import TAIL
+from mcstudy.statistics import by_size
 from mcstudy.text import capital, interval, number, unit
 from models.protocol import Model
 from studies.factor_report import groups_said
 from studies.failure_report import failure_map, failures_said, status_table
+from studies.morris.analysis import MorrisAnalysis, RankedOutput
 from studies.morris.schema import MorrisStudy
 
 NAMED = 4
@@ -20,20 +22,26 @@ CURVED = 0.5
 interacting (assumed)."""
 
 
-def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
+def draw(analysis: MorrisAnalysis) -> dict[str, Any]:
     """Return the study's figures by file name."""
-    outputs = analysis["outputs"]
-    ranked = {name: outputs[name] for name in analysis["ranked"] if _varies(outputs[name])}
+    ranked = {name: entry for name, entry in analysis.reported.items() if entry.varies}
     if not ranked:
         return failure_map(analysis)
     return failure_map(analysis) | {
-        "mean_effects": screening.draw_mean_effects(ranked, DUMMY),
-        "elementary_effects": screening.draw_elementary_effects(ranked),
+        "mean_effects": screening.draw_mean_effects(
+            {name: (entry.unit, entry.factors) for name, entry in ranked.items()}, DUMMY
+        ),
+        "elementary_effects": screening.draw_elementary_effects(
+            {
+                name: (entry.unit, {k: (e.value, e.sigma) for k, e in entry.factors.items()})
+                for name, entry in ranked.items()
+            }
+        ),
     }
 
 
 def sections_of(
-    study: MorrisStudy, model: Model, analysis: Mapping[str, Any], figures: Mapping[str, Any]
+    study: MorrisStudy, model: Model, analysis: MorrisAnalysis, figures: Mapping[str, Any]
 ) -> list[Section]:
     """Return the sections of the report.
 
@@ -43,12 +51,11 @@ def sections_of(
         Checked study file.
     model : Model
         Model of the runs.
-    analysis : mapping
-        As in ``analysis.json``.
+    analysis : MorrisAnalysis
+        Every number of the report.
     figures : mapping
         Figures by file name.
     """
-    outputs = analysis["outputs"]
 
     def one(name: str, caption: str) -> dict[str, Any]:
         return {caption: figures[name]} if name in figures else {}
@@ -58,7 +65,7 @@ def sections_of(
         Section(
             "Factor screening",
             [*summarise(analysis), *_not_ranked(analysis)],
-            [_table(name, outputs[name]) for name in analysis["ranked"] if _varies(outputs[name])],
+            [_table(name, entry) for name, entry in analysis.reported.items() if entry.varies],
             one("mean_effects",
                 f"Mean absolute elementary effect (μ*), {reach}, with 95 % intervals. Factors "
                 "below the noise line are not distinguishable from zero.")
@@ -70,7 +77,7 @@ def sections_of(
         Section(
             "Sampling uncertainty",
             [
-                f"Each of {analysis['trajectories']:,} trajectories changes one factor after the "
+                f"Each of {analysis.trajectories:,} trajectories changes one factor after the "
                 f"other by one large step between {study.design.levels} levels. The dummy perturbs "
                 f"every input by {PERTURBATION:g} of its range: its effect is the model's noise "
                 f"floor. Intervals are 95 %, by {study.report.resamples:,} bootstrap resamples of "
@@ -86,32 +93,30 @@ def sections_of(
     ]  # fmt: skip
 
 
-def summarise(analysis: Mapping[str, Any]) -> list[str]:
+def summarise(analysis: MorrisAnalysis) -> list[str]:
     """Return the influential factors of the reported outputs, a paragraph each."""
-    return [sentence(name, analysis["outputs"][name]) for name in analysis["ranked"]]
+    return [sentence(name, entry) for name, entry in analysis.reported.items()]
 
 
-def sentence(name: str, entry: Mapping[str, Any]) -> str:
+def sentence(name: str, entry: RankedOutput) -> str:
     """Return a sentence on the influential factors of an output."""
-    factors = dict(entry["factors"])
+    factors = dict(entry.factors)
     noise = factors.pop(DUMMY)
-    order = sorted(factors, key=lambda f: -factors[f]["value"])
-    clear = [f for f in order if factors[f]["clear"]]
-    suffix = f" {unit(entry['unit'])}".rstrip()
+    order = by_size({f: effect.value for f, effect in factors.items()})
+    clear = [f for f in order if factors[f].clear]
+    suffix = f" {unit(entry.unit)}".rstrip()
     title = style.words(name)
-    if not _varies(entry):
+    if not entry.varies:
         return f"{capital(title)} does not vary."
     if not clear:
         return f"{capital(title)}: no factor is distinguishable from noise."
     named = ", ".join(
-        f"{style.words(f)} ({number(factors[f]['value'])} ± "
-        f"{number(factors[f]['value'] - factors[f]['low'], 2)}{suffix})"
+        f"{style.words(f)} ({number(factors[f].value)} ± "
+        f"{number(factors[f].value - factors[f].low, 2)}{suffix})"
         for f in clear[:NAMED]
     )
     lines = [f"{capital(title)} is most sensitive to {named}."]
-    curved = [
-        f for f in clear[:NAMED] if (factors[f]["sigma"] or 0.0) > CURVED * factors[f]["value"]
-    ]
+    curved = [f for f in clear[:NAMED] if factors[f].sigma > CURVED * factors[f].value]
     if curved:
         lines.append(
             "Of these, curvature or interactions with other factors show in "
@@ -120,20 +125,15 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     weak = [f for f in order if f not in clear]
     if weak:
         lines.append(f"Not distinguishable from noise: {', '.join(style.words(f) for f in weak)}.")
-    lines.append(f"Noise floor: {number(noise['value'], 2)}{suffix}.")
+    lines.append(f"Noise floor: {number(noise.value, 2)}{suffix}.")
     return " ".join(lines)
 
 
-def _varies(entry: Mapping[str, Any]) -> bool:
-    """Return whether any factor, or the dummy, changes an output."""
-    return any(row["value"] != 0.0 for row in entry["factors"].values())
-
-
-def _not_ranked(analysis: Mapping[str, Any]) -> list[str]:
+def _not_ranked(analysis: MorrisAnalysis) -> list[str]:
     missing = [
-        f"{style.words(name)} ({entry['trajectories']:,} of {analysis['trajectories']:,})"
-        for name, entry in analysis["outputs"].items()
-        if "factors" not in entry
+        f"{style.words(name)} ({entry.trajectories:,} of {analysis.trajectories:,})"
+        for name, entry in analysis.outputs.items()
+        if not isinstance(entry, RankedOutput)
     ]
     if not missing:
         return []
@@ -143,16 +143,16 @@ def _not_ranked(analysis: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _table(name: str, entry: Mapping[str, Any]) -> Table:
-    factors = entry["factors"]
-    order = sorted(factors, key=lambda f: -factors[f]["value"])
+def _table(name: str, entry: RankedOutput) -> Table:
+    factors = entry.factors
+    order = by_size({f: effect.value for f, effect in factors.items()})
     rows = [
-        [style.words(f), interval(factors[f]), number(factors[f]["mean"]),
-         number(factors[f]["sigma"])]
+        [style.words(f), interval(factors[f]), number(factors[f].mean),
+         number(factors[f].sigma)]
         for f in order
     ]  # fmt: skip
     caption = (
-        f"{style.words(name)} [{unit(entry['unit']) or '–'}]: elementary effects over "
-        f"{entry['trajectories']:,} trajectories."
+        f"{style.words(name)} [{unit(entry.unit) or '–'}]: elementary effects over "
+        f"{entry.trajectories:,} trajectories."
     )
     return Table(caption, ["factor", "μ* (95 %)", "μ", "σ"], rows)

@@ -1,6 +1,8 @@
 """Injury-risk curves fitted to a table of cases, a user's or a study's."""
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,7 @@ from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.figures import risk, style
 from mcstudy.injury.cases import observations_of, read_cases, read_parquet
-from mcstudy.injury.risk_curve import INFLUENTIAL, describe_risk
+from mcstudy.injury.risk_curve import INFLUENTIAL, RiskDescription, describe_risk
 from mcstudy.report import Section, Table
 from mcstudy.text import interval, number, unit
 from studies.injury.analysis import CASES, proportional
@@ -22,6 +24,23 @@ from studies.publishing import publish
 from studies.runs import load_study_model
 
 
+@dataclass(frozen=True)
+class RiskCurveAnalysis(RiskDescription):
+    """Every number of a report of injury-risk curves.
+
+    Attributes
+    ----------
+    source : table of cases, or folder of an injury study.
+    stimulus, unit : name and unit of the stimulus; None where the table states no unit.
+    injury : name of the injury.
+    """
+
+    source: str
+    stimulus: str
+    unit: str | None
+    injury: str
+
+
 def fit_risk_curves(
     source: Path,
     stimulus: str,
@@ -29,7 +48,7 @@ def fit_risk_curves(
     *,
     level: int = 3,
     scenario: str | None = None,
-) -> dict[str, Any]:
+) -> RiskCurveAnalysis:
     """Fit injury-risk curves to cases and write a report of them.
 
     Parameters
@@ -44,11 +63,6 @@ def fit_risk_curves(
         AIS from which a case counts as injured, where the table has a column ``ais``.
     scenario : str, optional
         Of an injury study; by default the reference scenario.
-
-    Returns
-    -------
-    dict
-        The analysis, as in ``analysis.json``.
 
     Raises
     ------
@@ -67,17 +81,19 @@ def fit_risk_curves(
     injury = "injury" if plain else f"AIS{level}+"
     words = style.words(stimulus)
     xlabel = words if named is None else style.label(stimulus, named)
-    subtitle = f"{found['cases']:,} cases of {source.name}, {found['injured']:,} injured"
+    subtitle = f"{found.cases:,} cases of {source.name}, {found.injured:,} injured"
     with folder.open_for_writing():
         return publish(
             folder, f"Risk of {injury} against {words}", subtitle,
-            {"source": str(source), "stimulus": stimulus, "unit": named, "injury": injury} | found,
+            RiskCurveAnalysis(
+                **vars(found), source=str(source), stimulus=stimulus, unit=named, injury=injury
+            ),
             lambda held: {"risk_curve": risk.draw_risk_curve(held, xlabel, f"risk of {injury}")},
             _sections_of,
         )  # fmt: skip
 
 
-def _sections_of(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list[Section]:
+def _sections_of(analysis: RiskCurveAnalysis, figures: Mapping[str, Any]) -> list[Section]:
     caption = (
         "Risk with its 95 % band, the cases, the non-parametric estimate, and the stimuli at 5, "
         "25 and 50 % risk."
@@ -124,48 +140,45 @@ def _read(source: Path, stimulus: str, scenario: str | None) -> tuple[pd.DataFra
     return table[table[stimulus].notna()], named
 
 
-def summarise(analysis: Mapping[str, Any]) -> list[str]:
+def summarise(analysis: RiskCurveAnalysis) -> list[str]:
     """Return the result in sentences."""
-    unit_text = f" {unit(analysis['unit'])}".rstrip() if analysis["unit"] else ""
-    half, quarter, few = (
-        f"{interval(analysis['at'][p])}{unit_text}" for p in ("0.5", "0.25", "0.05")
-    )
+    unit_text = f" {unit(analysis.unit)}".rstrip() if analysis.unit else ""
+    half, quarter, few = (f"{interval(analysis.at[p])}{unit_text}" for p in ("0.5", "0.25", "0.05"))
     lines = [
-        f"Half are injured ({analysis['injury']}) at "
-        f"{style.words(analysis['stimulus'])} {half}, one in four at {quarter}, one in twenty at "
-        f"{few} ({analysis['family']} curve, {analysis['cases']:,} cases, "
-        f"{analysis['injured']:,} injured)."
+        f"Half are injured ({analysis.injury}) at "
+        f"{style.words(analysis.stimulus)} {half}, one in four at {quarter}, one in twenty at "
+        f"{few} ({analysis.family} curve, {analysis.cases:,} cases, "
+        f"{analysis.injured:,} injured)."
     ]
-    influence = analysis["influence"]
-    if influence is not None and influence["influential"]:
-        worst = influence["largest"][0]
+    influence = analysis.influence
+    if influence is not None and influence.influential:
+        worst = influence.largest[0]
         moved = (
             "leaves no curve"
-            if worst["shift"] is None
-            else f"moves it by {number(abs(worst['shift']), 2)} standard errors"
+            if not math.isfinite(worst.shift)
+            else f"moves it by {number(abs(worst.shift), 2)} standard errors"
         )
         lines.append(
-            f"{influence['influential']} influential case(s): leaving out case "
-            f"{worst['case']} {moved}."
+            f"{influence.influential} influential case(s): leaving out case {worst.case} {moved}."
         )
     return lines
 
 
-def tables(analysis: Mapping[str, Any]) -> list[Table]:
+def tables(analysis: RiskCurveAnalysis) -> list[Table]:
     """Return quality of the best curve and comparison of the families."""
     points = [
-        [f"{100 * float(p):g} %", interval(entry), number(entry["quality_index"], 2),
-         entry["quality"]]
-        for p, entry in analysis["at"].items()
+        [f"{100 * float(p):g} %", interval(entry), number(entry.quality_index, 2),
+         entry.quality]
+        for p, entry in analysis.at.items()
     ]  # fmt: skip
     families = [
-        [name, number(entry["aic"], 5), number(entry["log_likelihood"], 5),
-         number(entry["median"]), number(entry["intercept"], 4), number(entry["slope"], 4)]
-        for name, entry in analysis["families"].items()
+        [name, number(entry.aic, 5), number(entry.log_likelihood, 5),
+         number(entry.median), number(entry.intercept, 4), number(entry.slope, 4)]
+        for name, entry in analysis.families.items()
     ]  # fmt: skip
     return [
         Table(
-            f"{analysis['family']} curve: stimulus at three risks, and its quality index.",
+            f"{analysis.family} curve: stimulus at three risks, and its quality index.",
             ["risk", "stimulus (95 %)", "quality index", "class"],
             points,
         ),
@@ -177,12 +190,12 @@ def tables(analysis: Mapping[str, Any]) -> list[Table]:
     ]
 
 
-def _weighting(analysis: Mapping[str, Any]) -> list[str]:
+def _weighting(analysis: RiskCurveAnalysis) -> list[str]:
     """Return a sentence on the weights of the cases, if they have any."""
-    if analysis["weight"] is None:
+    if analysis.weight is None:
         return []
-    total = number(analysis["weight"], 6)
-    if analysis["counted"]:
+    total = number(analysis.weight, 6)
+    if analysis.counted:
         return [f"The rows represent {total} cases by their column 'weight', all counted."]
     return [
         f"The rows are weighted by their column 'weight' (sum {total}). The weights are not whole "
@@ -191,8 +204,8 @@ def _weighting(analysis: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _method(analysis: Mapping[str, Any]) -> list[str]:
-    exact = analysis["exact"]
+def _method(analysis: RiskCurveAnalysis) -> list[str]:
+    exact = analysis.exact
     lines = [
         "Survival analysis as in ISO/TS 18506: injured cases are left-censored, uninjured ones "
         f"right-censored{f', {exact} exact' if exact else ''}; Weibull, log-normal and "
@@ -203,7 +216,7 @@ def _method(analysis: Mapping[str, Any]) -> list[str]:
         "of the 95 % interval of the stimulus over the stimulus: up to 0.5 good, 1 fair, 1.5 "
         "marginal, above unacceptable.",
     ]
-    if analysis["influence"] is not None:
+    if analysis.influence is not None:
         lines.append(
             "Each case was left out once; one counts as influential if the stimulus at 5, "
             f"25 or 50 % risk moves by more than {INFLUENTIAL:g} standard error."

@@ -2,15 +2,14 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from mcstudy.errors import UserError
 from mcstudy.execution.progress import follow
 from mcstudy.execution.results import ResultsFolder
+from mcstudy.figures.screening import Ranked
 from mcstudy.sensitivity.given_data import measure_given_data
-from mcstudy.statistics import Estimate
 from mcstudy.studyfile.schema import SampledStudy
 from mcstudy.studyfile.study_inputs import dependent_pairs
 from mcstudy.studyfile.study_outputs import check_outputs, report_outputs
@@ -19,6 +18,7 @@ from studies.kinds import KINDS, load_study
 from studies.main_effects import main_effects_of
 from studies.publishing import publish
 from studies.runs import columns_of, load_study_model
+from studies.sensitivity.analysis import GivenDataAnalysis, Measure, MeasuredOutput
 from studies.sensitivity.report import draw, sections_of
 
 
@@ -28,7 +28,7 @@ def measure_sensitivity(
     *,
     outputs: Sequence[str] = (),
     quiet: bool = False,
-) -> dict[str, Any]:
+) -> GivenDataAnalysis:
     """Estimate sensitivities of outputs from the runs of a results folder and write a report.
 
     Parameters
@@ -41,11 +41,6 @@ def measure_sensitivity(
         Names of outputs, by default those that the study reports.
     quiet : bool
         No progress line.
-
-    Returns
-    -------
-    dict
-        The analysis, as in ``analysis.json``.
 
     Raises
     ------
@@ -70,15 +65,8 @@ def measure_sensitivity(
     runs = kind.independent_rows(source.runs(columns_of(model)), source)
     complete = runs[runs["status"].isin(complete_status(model))]
     inputs = list(study.inputs)
-    analysis: dict[str, Any] = {
-        "source": str(source.path),
-        "kind": study.kind,
-        "title": study.title,
-        "runs": len(complete),
-        "dependent": sorted({name for pair in dependent_pairs(study) for name in pair}),
-        "outputs": {},
-        "main_effects": {},
-    }
+    measured: dict[str, MeasuredOutput] = {}
+    main_effects = {}
     values = complete[inputs].to_numpy(dtype=float)
     for name, column in zip(inputs, values.T, strict=True):
         if not np.isfinite(column).all():
@@ -91,20 +79,26 @@ def measure_sensitivity(
         except ValueError as error:
             raise UserError(f"{source.path}: {name}: {error}") from None
         measures = {
-            measure: {
-                "noise": found.noise[measure],
-                "inputs": {
-                    key: Estimate(*table[:, k].tolist()).as_dict()
-                    | {"clear": bool(table[0, k] > found.noise[measure])}
-                    for k, key in enumerate(inputs)
+            measure: Measure(
+                found.noise[measure],
+                {
+                    key: Ranked(value, low, high, clear=bool(value > found.noise[measure]))
+                    for key, (value, low, high) in zip(inputs, table.T.tolist(), strict=True)
                 },
-            }
+            )
             for measure, table in found.values.items()
         }
-        analysis["outputs"][name] = {
-            "unit": unit_of[name], "runs": found.runs, "measures": measures
-        }  # fmt: skip
-        analysis["main_effects"][name] = main_effects_of(study, model, complete, name)
+        measured[name] = MeasuredOutput(unit_of[name], found.runs, measures)
+        main_effects[name] = main_effects_of(study, model, complete, name)
+    analysis = GivenDataAnalysis(
+        source=str(source.path),
+        kind=study.kind,
+        title=study.title,
+        runs=len(complete),
+        dependent=sorted({name for pair in dependent_pairs(study) for name in pair}),
+        outputs=measured,
+        main_effects=main_effects,
+    )
     with folder.open_for_writing():
         subtitle = f"Sensitivity from {len(complete):,} runs of the {study.kind} study {study.name}"
         return publish(folder, study.title, subtitle, analysis, draw, sections_of)

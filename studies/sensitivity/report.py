@@ -1,12 +1,15 @@
 """The report of given-data sensitivity by three measures."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 from mcstudy.figures import screening, sensitivity, style
 from mcstudy.report import Section, Table
 from mcstudy.sensitivity.given_data import DUMMIES
+from mcstudy.statistics import by_size
 from mcstudy.text import capital, number, share
+from studies.sensitivity.analysis import GivenDataAnalysis, MeasuredOutput
 
 TITLES = {
     "first_order": "first-order index, rank based [–]",
@@ -17,24 +20,27 @@ NAMED = 4
 """Inputs that a sentence names, the largest."""
 
 
-def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
+def draw(analysis: GivenDataAnalysis) -> dict[str, Any]:
     """Return the figures by file name."""
     figures = {}
-    for name, entry in analysis["outputs"].items():
+    for name, entry in analysis.outputs.items():
         if not _varies(entry):
             continue
-        figures[f"measures_{name}"] = screening.draw_given_data(entry["measures"], TITLES)
+        figures[f"measures_{name}"] = screening.draw_given_data(
+            {key: (measure.inputs, measure.noise) for key, measure in entry.measures.items()},
+            TITLES,
+        )
         figures[f"main_effects_{name}"] = sensitivity.draw_main_effects(
-            analysis["main_effects"][name],
-            style.label(name, entry["unit"]),
+            analysis.main_effects[name],
+            style.label(name, entry.unit),
         )
     return figures
 
 
-def sections_of(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list[Section]:
+def sections_of(analysis: GivenDataAnalysis, figures: Mapping[str, Any]) -> list[Section]:
     """Return the sections of the report."""
     sections = []
-    for name, entry in analysis["outputs"].items():
+    for name, entry in analysis.outputs.items():
         words = style.words(name)
         heading, said = capital(words), [sentence(name, entry)]
         if not _varies(entry):
@@ -50,23 +56,23 @@ def sections_of(analysis: Mapping[str, Any], figures: Mapping[str, Any]) -> list
     return [*sections, Section("Interpretation and limitations", _explained(analysis))]
 
 
-def summarise(analysis: Mapping[str, Any]) -> list[str]:
+def summarise(analysis: GivenDataAnalysis) -> list[str]:
     """Return the influential inputs of the outputs, a paragraph each."""
-    return [sentence(name, entry) for name, entry in analysis["outputs"].items()]
+    return [sentence(name, entry) for name, entry in analysis.outputs.items()]
 
 
-def sentence(name: str, entry: Mapping[str, Any]) -> str:
+def sentence(name: str, entry: MeasuredOutput) -> str:
     """Return sentences on the influential inputs of an output."""
     words = style.words(name)
     if not _varies(entry):
         return f"{capital(words)} does not vary."
-    first = entry["measures"]["first_order"]["inputs"]
-    order = sorted(first, key=lambda key: -first[key]["value"])
-    clear = [key for key in order if first[key]["clear"]]
+    first = entry.measures["first_order"].inputs
+    order = by_size({key: index.value for key, index in first.items()})
+    clear = [key for key in order if first[key].clear]
     if clear:
         named = ", ".join(
-            f"{style.words(key)} {100.0 * first[key]['value']:.0f} ± "
-            f"{max(1.0, 50.0 * (first[key]['high'] - first[key]['low'])):.0f} %"
+            f"{style.words(key)} {100.0 * first[key].value:.0f} ± "
+            f"{max(1.0, 50.0 * (first[key].high - first[key].low)):.0f} %"
             for key in clear[:NAMED]
         )
         text = f"First-order shares of the variance of {words}: {named}."
@@ -75,8 +81,7 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     others = [
         key
         for key in order
-        if key not in clear
-        and any(entry["measures"][m]["inputs"][key]["clear"] for m in ("delta", "pawn"))
+        if key not in clear and any(entry.measures[m].inputs[key].clear for m in ("delta", "pawn"))
     ]
     if others:
         text += (
@@ -86,31 +91,31 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     none = [
         key
         for key in order
-        if not any(table["inputs"][key]["clear"] for table in entry["measures"].values())
+        if not any(table.inputs[key].clear for table in entry.measures.values())
     ]
     if none:
         text += f" Not distinguishable from zero: {', '.join(map(style.words, none))}."
     return text
 
 
-def _varies(entry: Mapping[str, Any]) -> bool:
-    return entry["measures"]["first_order"]["noise"] is not None
+def _varies(entry: MeasuredOutput) -> bool:
+    return not math.isnan(entry.measures["first_order"].noise)
 
 
-def _table(name: str, entry: Mapping[str, Any]) -> Table:
-    measures = entry["measures"]
-    first = measures["first_order"]["inputs"]
-    order = sorted(first, key=lambda key: -(first[key]["value"] or 0.0))
+def _table(name: str, entry: MeasuredOutput) -> Table:
+    measures = entry.measures
+    first = measures["first_order"].inputs
+    order = by_size({key: index.value for key, index in first.items()})
     rows = [
-        [style.words(key), *(share(table["inputs"][key]) for table in measures.values())]
+        [style.words(key), *(share(table.inputs[key]) for table in measures.values())]
         for key in order
     ]
-    rows.append(["noise line", *(number(table["noise"], 2) for table in measures.values())])
+    rows.append(["noise line", *(number(table.noise, 2) for table in measures.values())])
     head = ["input", *(TITLES[measure].removesuffix(" [–]") for measure in measures)]
-    return Table(f"{style.words(name)}: {entry['runs']:,} runs with a value.", head, rows)
+    return Table(f"{style.words(name)}: {entry.runs:,} runs with a value.", head, rows)
 
 
-def _explained(analysis: Mapping[str, Any]) -> list[str]:
+def _explained(analysis: GivenDataAnalysis) -> list[str]:
     lines = [
         "First-order index, rank based: the share of the variance due to the input alone. "
         "Delta: the share of the whole density that moves when the input is known. PAWN: the "
@@ -122,9 +127,9 @@ def _explained(analysis: Mapping[str, Any]) -> list[str]:
         "None of them detects an input that acts through interactions alone; total indices need "
         "a Sobol' study.",
     ]
-    if analysis["dependent"]:
+    if analysis.dependent:
         lines.append(
-            f"{', '.join(map(style.words, analysis['dependent']))} depend on each other: the "
+            f"{', '.join(map(style.words, analysis.dependent))} depend on each other: the "
             "effect of one also appears with the others. The numbers are associations and do not "
             "add up."
         )

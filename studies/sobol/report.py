@@ -1,5 +1,6 @@
 """The report of a Sobol' study: indices in text, tables and figures."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -7,46 +8,49 @@ from mcstudy.figures import sensitivity, style
 from mcstudy.report import Section, Table
 from mcstudy.sampling.factors import DUMMY, PERTURBATION
 from mcstudy.sampling.saltelli import SCRAMBLES
+from mcstudy.statistics import Estimate, by_size
 from mcstudy.text import capital, quantity, share
 from models.protocol import Model
 from studies.factor_report import groups_said
 from studies.failure_report import failure_map, failures_said, status_table
+from studies.sobol.analysis import IndexedOutput, SobolAnalysis
 from studies.sobol.schema import SobolStudy
 
 NAMED = 4
 """Factors that a sentence names, the largest."""
 
 
-def draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
+def draw(analysis: SobolAnalysis) -> dict[str, Any]:
     """Return the study's figures by file name."""
-    outputs = analysis["outputs"]
-    varying = [name for name in analysis["convergence"] if varies(outputs[name])]
+    varying = {name: entry for name, entry in analysis.reported.items() if entry.varies}
     figures: dict[str, Any] = failure_map(analysis)
     if not varying:
         return figures
     figures |= {
-        "indices": sensitivity.draw_indices({name: outputs[name] for name in varying}, DUMMY),
+        "indices": sensitivity.draw_indices(
+            {name: (entry.first, entry.total) for name, entry in varying.items()}, DUMMY
+        ),
         "heatmap": sensitivity.draw_heatmap(
-            {name: entry for name, entry in outputs.items() if "total" in entry}
+            {name: entry.total for name, entry in analysis.indexed.items()}
         ),
         "convergence": sensitivity.draw_convergence(
-            {name: analysis["convergence"][name] for name in varying}
+            {name: {step.n: step.total for step in analysis.convergence[name]} for name in varying}
         ),
     }
-    for name in varying:
+    for name, entry in varying.items():
         figures[f"main_effects_{name}"] = sensitivity.draw_main_effects(
-            analysis["main_effects"][name],
-            style.label(name, outputs[name]["unit"]),
+            analysis.main_effects[name],
+            style.label(name, entry.unit),
         )
-        if "second" in outputs[name]:
+        if entry.second is not None:
             figures[f"second_order_{name}"] = sensitivity.draw_second_order(
-                outputs[name], analysis["factors"], style.words(name)
+                entry.second, analysis.factors, style.words(name)
             )
     return figures
 
 
 def sections_of(
-    study: SobolStudy, model: Model, analysis: Mapping[str, Any], figures: Mapping[str, Any]
+    study: SobolStudy, model: Model, analysis: SobolAnalysis, figures: Mapping[str, Any]
 ) -> list[Section]:
     """Return the sections of the report.
 
@@ -56,13 +60,12 @@ def sections_of(
         Checked study file.
     model : Model
         Model of the runs.
-    analysis : mapping
-        As in ``analysis.json``.
+    analysis : SobolAnalysis
+        Every number of the report.
     figures : mapping
         Figures by file name.
     """
-    wanted = list(analysis["convergence"])
-    outputs = analysis["outputs"]
+    wanted = analysis.reported
 
     def picked(prefix: str, caption: str) -> dict[str, Any]:
         return {
@@ -78,7 +81,7 @@ def sections_of(
         Section(
             "Sensitivity indices",
             summarise(analysis),
-            [_index_table(name, outputs[name]) for name in wanted if varies(outputs[name])],
+            [_index_table(name, entry) for name, entry in wanted.items() if entry.varies],
             one("indices", "First-order and total indices with 95 % intervals. Factors whose total "
                 "index is below the noise line are not distinguishable from zero."),
         ),
@@ -91,7 +94,7 @@ def sections_of(
                 "does not vary, or hardly ever."),
         ),
     ]  # fmt: skip
-    if any(varies(outputs[name]) for name in wanted):
+    if any(entry.varies for entry in wanted.values()):
         sections.append(
             Section(
                 "Main effects",
@@ -135,26 +138,26 @@ def sections_of(
     ]  # fmt: skip
 
 
-def summarise(analysis: Mapping[str, Any]) -> list[str]:
+def summarise(analysis: SobolAnalysis) -> list[str]:
     """Return the influential factors of the reported outputs, a paragraph each."""
-    return [sentence(name, analysis["outputs"][name]) for name in analysis["convergence"]]
+    return [sentence(name, entry) for name, entry in analysis.reported.items()]
 
 
-def sentence(name: str, entry: Mapping[str, Any]) -> str:
+def sentence(name: str, entry: IndexedOutput) -> str:
     """Return sentences on the influential factors of an output."""
     title = style.words(name)
-    if not varies(entry):
+    if not entry.varies:
         return f"{capital(title)} does not vary."
-    first, total = entry["first"], entry["total"]
-    if any(row["low"] is None for table in (first, total) for row in table.values()):
+    first, total = entry.first, entry.total
+    if any(not row.has_interval for table in (first, total) for row in table.values()):
         return (
             f"{capital(title)} hardly ever changes: in some resamples of the design it does not "
             "vary, so its indices have no intervals and are not interpreted."
         )
     noise = total[DUMMY]
     factors = [factor for factor in total if factor != DUMMY]
-    order = sorted(factors, key=lambda factor: -first[factor]["value"])
-    clear = [factor for factor in order if first[factor]["low"] > 0.0]
+    order = sorted(factors, key=lambda factor: -first[factor].value)
+    clear = [factor for factor in order if first[factor].low > 0.0]
     lines = []
     if clear:
         named = ", ".join(f"{style.words(f)} {_share(first[f])}" for f in clear[1:NAMED])
@@ -165,19 +168,19 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     else:
         lines.append(f"no first-order index of {title} is distinguishable "
                      "from zero.")  # fmt: skip
-    alone = entry["alone"]
+    alone = entry.alone
     lines.append(
         f"All factors on their own explain {_share(alone)}; "
         + (
-            "the rest are interactions" + (" and chaos." if noise["value"] > 0.01 else ".")
-            if alone["high"] < 1.0 - noise["high"]
+            "the rest are interactions" + (" and chaos." if noise.value > 0.01 else ".")
+            if alone.high < 1.0 - noise.high
             else "interactions are not distinguishable from none."
         )
     )
     # Chaotic scatter raises every total index.
-    felt = [f for f in factors if total[f]["low"] > noise["high"]]
-    mixed = [f for f in felt if total[f]["low"] > first[f]["high"] + noise["high"]]
-    mixed.sort(key=lambda f: first[f]["value"] - total[f]["value"])
+    felt = [f for f in factors if total[f].low > noise.high]
+    mixed = [f for f in felt if total[f].low > first[f].high + noise.high]
+    mixed.sort(key=lambda f: first[f].value - total[f].value)
     if mixed:
         named = ", ".join(
             f"{style.words(f)} ({_percent(first[f])} alone, {_percent(total[f])} with interactions)"
@@ -199,49 +202,39 @@ def sentence(name: str, entry: Mapping[str, Any]) -> str:
     lines.append(
         f"{_share(noise)} of the variance is not attributable to any input: a perturbation of all "
         f"inputs by {PERTURBATION:g} of their range makes {title} scatter by "
-        f"{_quantity(entry['noise_sd'], entry)} (standard deviation)."
+        f"{quantity(entry.noise_sd, entry.unit, 2)} (standard deviation)."
     )
     return " ".join(capital(line) for line in lines)
 
 
-def _share(entry: Mapping[str, float]) -> str:
-    value, half = 100.0 * entry["value"], 50.0 * (entry["high"] - entry["low"])
+def _share(entry: Estimate) -> str:
+    value, half = 100.0 * entry.value, 50.0 * (entry.high - entry.low)
     if abs(value) < 0.5 and half < 0.5:
         return "less than 1 %"
     return f"{_percent(entry, ' ')}± {max(half, 1.0):.0f} %"
 
 
-def _percent(entry: Mapping[str, float], unit: str = " %") -> str:
+def _percent(entry: Estimate, unit: str = " %") -> str:
     # Negative estimates are noise about zero.
-    return f"{max(0, round(100.0 * entry['value']))}{unit}"
+    return f"{max(0, round(100.0 * entry.value))}{unit}"
 
 
-def _quantity(value: float | None, entry: Mapping[str, Any]) -> str:
-    return quantity(value, entry["unit"], 2)
-
-
-def varies(entry: Mapping[str, Any]) -> bool:
-    """Return whether an output with indices varies; an infinite variance is null in JSON."""
-    return bool(entry["variance"] != 0.0)
-
-
-def _sd(entry: Mapping[str, Any]) -> float | None:
-    """Return the standard deviation of an output."""
-    return None if entry["variance"] is None else float(entry["variance"] ** 0.5)
-
-
-def _index_table(name: str, entry: Mapping[str, Any]) -> Table:
-    order = sorted(entry["total"], key=lambda f: -(entry["total"][f]["value"] or 0.0))
-    rows = [[style.words(f), share(entry["first"][f]), share(entry["total"][f])] for f in order]
+def _index_table(name: str, entry: IndexedOutput) -> Table:
+    order = by_size({factor: total.value for factor, total in entry.total.items()})
+    rows = [[style.words(f), share(entry.first[f]), share(entry.total[f])] for f in order]
     caption = (
-        f"{style.words(name)}: standard deviation {_quantity(_sd(entry), entry)}, "
-        f"{entry['base_points']:,} base points. Negative estimates are noise about zero."
+        f"{style.words(name)}: standard deviation {_sd(entry)}, "
+        f"{entry.base_points:,} base points. Negative estimates are noise about zero."
     )
     return Table(caption, ["factor", "first order (95 %)", "total (95 %)"], rows)
 
 
-def _constant(analysis: Mapping[str, Any]) -> list[str]:
-    held = [n for n, entry in analysis["outputs"].items() if "total" in entry and not varies(entry)]
+def _sd(entry: IndexedOutput) -> str:
+    return quantity(entry.variance**0.5, entry.unit, 2)
+
+
+def _constant(analysis: SobolAnalysis) -> list[str]:
+    held = [name for name, entry in analysis.indexed.items() if not entry.varies]
     if not held:
         return []
     return [
@@ -249,11 +242,11 @@ def _constant(analysis: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _not_given(analysis: Mapping[str, Any]) -> list[str]:
+def _not_given(analysis: SobolAnalysis) -> list[str]:
     missing = [
-        f"{style.words(name)} ({entry['base_points']:,} of {analysis['base_points']:,})"
-        for name, entry in analysis["outputs"].items()
-        if "total" not in entry
+        f"{style.words(name)} ({entry.base_points:,} of {analysis.base_points:,})"
+        for name, entry in analysis.outputs.items()
+        if name not in analysis.indexed
     ]
     if not missing:
         return []
@@ -263,36 +256,36 @@ def _not_given(analysis: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _noise_table(analysis: Mapping[str, Any]) -> Table:
+def _noise_table(analysis: SobolAnalysis) -> Table:
     rows = []
-    for name, entry in analysis["outputs"].items():
-        if "total" in entry and varies(entry):
-            noise = entry["total"][DUMMY]["value"]
+    for name, entry in analysis.indexed.items():
+        if entry.varies:
+            noise = entry.total[DUMMY].value
             rows.append(
                 [
                     style.words(name),
-                    _quantity(_sd(entry), entry),
-                    _quantity(entry["noise_sd"], entry),
-                    "–" if noise is None else f"{100.0 * noise:.2g} %",
+                    _sd(entry),
+                    quantity(entry.noise_sd, entry.unit, 2),
+                    f"{100.0 * noise:.2g} %" if math.isfinite(noise) else "–",
                 ]
             )
     head = ["output", "standard deviation", "noise floor", "share of the variance"]
     return Table("Noise floor by output.", head, rows)
 
 
-def _convergence_said(analysis: Mapping[str, Any]) -> str:
-    if analysis["widest"] is None:
+def _convergence_said(analysis: SobolAnalysis) -> str:
+    if not math.isfinite(analysis.widest):
         return "Some intervals could not be estimated: an output hardly ever changes."
-    if not any(varies(analysis["outputs"][name]) for name in analysis["convergence"]):
+    if not any(entry.varies for entry in analysis.reported.values()):
         return "No reported output varies, so there is no index whose interval could be wide."
     said = (
         f"The widest 95 % interval of a total index of the reported outputs is "
-        f"{analysis['widest']:.3f} wide, with a design of {analysis['base_points']:,} base points."
+        f"{analysis.widest:.3f} wide, with a design of {analysis.base_points:,} base points."
     )
-    tolerance = analysis["tolerance"]
+    tolerance = analysis.tolerance
     if tolerance is None:
         return said
-    if analysis["widest"] <= tolerance:
+    if analysis.widest <= tolerance:
         return f"{said} The study asked for {tolerance:g}: met."
     return f"{said} The study asked for {tolerance:g}: NOT met, the budget is spent."
 

@@ -17,12 +17,14 @@ from mcstudy.sampling.saltelli import block_size, draw_saltelli, is_base_row
 from studies.factor_kind import FactorKind
 from studies.kind import Finished
 from studies.runs import ModelRuns, RunPlan, run_rows
-from studies.sobol.analysis import analyse, widest_interval
+from studies.sobol.analysis import SobolAnalysis, analyse, widest_interval
 from studies.sobol.report import draw, sections_of, summarise
 from studies.sobol.schema import SobolStudy
 
+Done = Finished[SobolStudy, ModelRuns, SobolAnalysis]
 
-class Sobol(FactorKind[SobolStudy]):
+
+class Sobol(FactorKind[SobolStudy, SobolAnalysis]):
     """Saltelli's design of one model, doubled until the indices are accurate enough.
 
     It doubles from ``design.start`` base points until the widest interval of a total index of the
@@ -31,6 +33,7 @@ class Sobol(FactorKind[SobolStudy]):
     """
 
     schema = SobolStudy
+    analysis = SobolAnalysis
 
     def design(self, study: SobolStudy) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Return the design and the independent part of each row."""
@@ -85,29 +88,27 @@ class Sobol(FactorKind[SobolStudy]):
                 return
             n *= 2
 
-    def analyse(self, study: SobolStudy, results: ModelRuns) -> dict[str, Any]:
+    def analyse(self, study: SobolStudy, results: ModelRuns) -> SobolAnalysis:
         """Return every number that the report prints."""
         return analyse(study, results.model, results.runs)
 
-    def subtitle(self, done: Finished[SobolStudy, ModelRuns]) -> str:
+    def subtitle(self, done: Done) -> str:
         """Return the line below the report's title."""
         return (
             f"Sobol' study of {len(done.results.runs):,} runs of the "
-            f"{done.results.model.name} model: {done.analysis['base_points']:,} base points, "
+            f"{done.results.model.name} model: {done.analysis.base_points:,} base points, "
             f"seed {done.study.seed}"
         )
 
-    def draw(self, done: Finished[SobolStudy, ModelRuns]) -> dict[str, Any]:
+    def draw(self, done: Done) -> dict[str, Any]:
         """Return the figures by file name."""
         return draw(done.analysis)
 
-    def sections(
-        self, done: Finished[SobolStudy, ModelRuns], figures: Mapping[str, Any]
-    ) -> Sequence[Section]:
+    def sections(self, done: Done, figures: Mapping[str, Any]) -> Sequence[Section]:
         """Return the sections of the report."""
         return sections_of(done.study, done.results.model, done.analysis, figures)
 
-    def summarise(self, analysis: Mapping[str, Any]) -> list[str]:
+    def summarise(self, analysis: SobolAnalysis) -> list[str]:
         """Return the influential factors of the reported outputs."""
         return summarise(analysis)
 

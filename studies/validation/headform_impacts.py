@@ -9,7 +9,7 @@ from mcstudy.figures.style import PALETTE
 from models.contact.corridor import Corridor, load_corridors
 from models.registry import load_model
 from models.vehicle.profile import load_vehicle
-from studies.stiffness import COORDINATES, hic_corridor
+from studies.stiffness_fit.analysis import COORDINATES, hic_corridor
 from studies.validation.check import Part, check, references
 
 Array = NDArray[np.float64]

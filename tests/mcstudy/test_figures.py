@@ -22,7 +22,9 @@ from mcstudy.execution.results import to_json
 from mcstudy.figures import crash, distributions, panels, relations, risk, stiffness, style
 from mcstudy.figures.distributions import Mark
 from mcstudy.figures.panels import Band, Curve, Panel, draw_panels, use_log_scale
+from mcstudy.injury.risk_curve import RiskDescription
 from mcstudy.injury.survival import QUALITY_AT
+from mcstudy.typed_json import from_plain
 
 UNITS = {"hic15": "1", "throw_distance": "m", "wad": "m"}
 MARKS = {
@@ -50,7 +52,7 @@ def runs() -> pd.DataFrame:
     return frame
 
 
-def described(runs: pd.DataFrame) -> dict[str, Any]:
+def described(runs: pd.DataFrame) -> dict[str, statistics.Described]:
     return {name: statistics.describe(runs[name].to_numpy()) for name in UNITS}
 
 
@@ -82,12 +84,12 @@ def test_distributions_carry_units_marks_and_the_share_of_runs_below(runs: pd.Da
     assert share[-1] == 1.0
 
 
-def test_distributions_draw_what_json_leaves_of_the_analysis(runs: pd.DataFrame) -> None:
-    # Intervals that do not exist are null in analysis.json, NaN before.
-    for nothing in (None, np.nan):
-        held = described(runs)
-        held["wad"]["quantiles"]["0.5"] |= {"low": nothing, "high": nothing}
-        check_drawn(distributions.draw_distributions(runs, {"wad": "m"}, {}, held))
+def test_a_median_without_an_interval_is_drawn(runs: pd.DataFrame) -> None:
+    held = described(runs)["wad"]
+    assert isinstance(held, statistics.Distribution)
+    median = replace(held.quantiles["0.5"], low=np.nan, high=np.nan)
+    bare = replace(held, quantiles={**held.quantiles, "0.5": median})
+    check_drawn(distributions.draw_distributions(runs, {"wad": "m"}, {}, {"wad": bare}))
 
 
 def test_two_runs_are_both_in_the_picture() -> None:
@@ -154,15 +156,15 @@ def test_the_risk_curve_is_drawn_with_band_steps_rug_and_lines_of_the_standard()
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("HIC15 [–]", "risk [–]")
     assert axes.get_title() == "skull fracture"
     assert axes.get_ylim()[0] < 0.0 and axes.get_ylim()[1] > 1.0
-    family, hurt = analysis()["family"], int(cases().injured.sum())
+    family, hurt = analysis().family, int(cases().injured.sum())
     shown = legend_of(figure)
     assert {"95 % band", family, f"injured ({hurt})", f"uninjured ({50 - hurt})"} <= set(shown)
     assert any("Turnbull" in word for word in shown)
     (curve,) = [line for line in axes.lines if line.get_label() == family]
-    assert_array_equal(curve.get_ydata(), analysis()["curve"]["risk"])
+    assert_array_equal(curve.get_ydata(), analysis().curve.risk)
     dotted = [line for line in axes.lines if line.get_linestyle() == ":"]
     for line, p in zip(dotted, QUALITY_AT, strict=True):
-        assert_allclose(line.get_xydata()[1], [analysis()["at"][f"{p:g}"]["value"], p])
+        assert_allclose(line.get_xydata()[1], [analysis().at[f"{p:g}"].value, p])
     marks = {line.get_label(): line for line in axes.lines if line.get_marker() == "|"}
     assert len(marks) == 2
     for label, line in marks.items():
@@ -172,7 +174,9 @@ def test_the_risk_curve_is_drawn_with_band_steps_rug_and_lines_of_the_standard()
         heights = np.asarray(line.get_ydata())
         assert np.all(heights > 0.9) if injured else np.all(heights < 0.1)
     # A description read back from JSON is drawn alike.
-    back = risk.draw_risk_curve(json.loads(to_json(analysis())), "HIC15 [–]", "skull fracture")
+    back = risk.draw_risk_curve(
+        from_plain(RiskDescription, json.loads(to_json(analysis()))), "HIC15 [–]", "skull fracture"
+    )
     assert style.png_bytes(figure, dpi=50) == style.png_bytes(back, dpi=50)
 
 

@@ -1,6 +1,7 @@
 """Intervals: closed forms where there are some, coverage by simulation where not."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy import optimize, stats
 
 from mcstudy import statistics
 from mcstudy.sampling import designs
-from mcstudy.statistics import Estimate
+from mcstudy.statistics import Distribution, Estimate
 
 Groups = NDArray[np.int64]
 
@@ -145,43 +146,49 @@ def test_what_gives_no_spread_has_a_value_and_no_interval() -> None:
     assert statistics.mean(values, np.arange(20)).value == pytest.approx(9.5)
 
 
+def described(values: Array, replicate: NDArray[np.int64] | None = None) -> Distribution:
+    found = statistics.describe(values, replicate=replicate)
+    assert isinstance(found, Distribution)
+    return found
+
+
 def test_describe_counts_what_is_undefined_and_describes_the_rest() -> None:
     values = np.concatenate([np.arange(101.0), [np.nan, np.inf, -np.inf]])
-    found: Any = statistics.describe(values)
-    assert (found["n"], found["undefined"]) == (101, 3)
-    assert found["mean"]["value"] == pytest.approx(50.0)
-    assert found["sd"]["value"] == pytest.approx(np.sqrt(101 * 102 / 12))
-    assert list(found["quantiles"]) == ["0.05", "0.25", "0.5", "0.75", "0.95"]
-    for name, estimate in found["quantiles"].items():
-        assert estimate["value"] == pytest.approx(100.0 * float(name))
-        assert estimate["low"] < estimate["value"] < estimate["high"]
+    found = described(values)
+    assert (found.n, found.undefined) == (101, 3)
+    assert found.mean.value == pytest.approx(50.0)
+    assert found.sd.value == pytest.approx(np.sqrt(101 * 102 / 12))
+    assert list(found.quantiles) == ["0.05", "0.25", "0.5", "0.75", "0.95"]
+    for name, estimate in found.quantiles.items():
+        assert estimate.value == pytest.approx(100.0 * float(name))
+        assert estimate.low < estimate.value < estimate.high
 
 
 def test_describe_leaves_undefined_values_out_of_their_replicates() -> None:
     values, groups = generator(5).normal(size=80), groups_of(80, 20)
     holed = np.concatenate([values, np.full(4, np.nan)])
-    found = statistics.describe(holed, np.concatenate([groups, np.arange(4)]))
-    assert found == statistics.describe(values, groups) | {"undefined": 4}
+    found = described(holed, np.concatenate([groups, np.arange(4)]))
+    assert found == replace(described(values, groups), undefined=4)
     # The mean of unequal replicates is that of the samples.
     values = np.array([1.0, 2.0, 3.0, 4.0, np.nan, np.nan, 8.0, 9.0])
-    unequal: Any = statistics.describe(values, groups_of(8, 4))
-    assert unequal["mean"]["value"] == pytest.approx(np.nanmean(values))
+    unequal = described(values, groups_of(8, 4))
+    assert unequal.mean.value == pytest.approx(np.nanmean(values))
 
 
 @pytest.mark.parametrize("values", [[], [np.nan, np.nan], [3.0], [3.0, np.nan]])
 def test_describe_of_fewer_than_two_values_only_counts(values: list[float]) -> None:
     defined = int(np.isfinite(values).sum())
-    expected = {"n": defined, "undefined": len(values) - defined}
-    assert statistics.describe(np.array(values, dtype=float)) == expected
+    expected = statistics.TooFew("m", defined, len(values) - defined)
+    assert statistics.describe(np.array(values, dtype=float), "m") == expected
 
 
 def test_convergence_doubles_the_finite_values() -> None:
     values = np.concatenate([np.arange(800.0), np.full(10, np.nan)])
     found = statistics.convergence(values, lambda part: float(part.mean()))
-    assert [(entry["n"], entry["value"]) for entry in found] == [
+    assert [(entry.n, entry.value) for entry in found] == [
         (100, 49.5), (200, 99.5), (400, 199.5), (800, 399.5),
     ]  # fmt: skip
-    assert [entry["n"] for entry in statistics.convergence(np.arange(20.0), np.sum)] == [10, 20]
+    assert [entry.n for entry in statistics.convergence(np.arange(20.0), np.sum)] == [10, 20]
 
 
 @pytest.mark.parametrize(
@@ -198,19 +205,20 @@ def test_values_vary_if_they_differ_by_more_than_rounding(values: list[float], t
 
 def test_a_constant_has_no_spread_and_no_interval() -> None:
     values = 700.1 * (1.0 + 1e-15 * np.arange(20.0))
-    found: Any = statistics.describe(values, groups_of(20, 5))
-    assert found["sd"]["value"] == 0.0
-    for estimate in (found["mean"], found["sd"], *found["quantiles"].values()):
-        assert np.isnan([estimate["low"], estimate["high"]]).all()
-    assert found["quantiles"]["0.5"]["value"] == pytest.approx(700.1)
+    found = described(values, groups_of(20, 5))
+    assert found.sd.value == 0.0
+    for estimate in (found.mean, found.sd, *found.quantiles.values()):
+        assert np.isnan([estimate.low, estimate.high]).all()
+    assert found.quantiles["0.5"].value == pytest.approx(700.1)
 
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("exponent", [-900, 900])
 def test_a_power_of_two_changes_no_digit(exponent: int) -> None:
     values, groups = generator(3).normal(5.0, 1.0, 80), groups_of(80, 20)
-    plain: Any = statistics.describe(values, groups)
-    scaled: Any = statistics.describe(np.ldexp(values, exponent), groups)
+    plain = described(values, groups)
+    scaled = described(np.ldexp(values, exponent), groups)
     for key in ("mean", "sd"):
         for side in ("value", "low", "high"):
-            assert scaled[key][side] == np.ldexp(plain[key][side], exponent)
+            one, other = (getattr(getattr(found, key), side) for found in (scaled, plain))
+            assert one == np.ldexp(other, exponent)

@@ -6,6 +6,8 @@ import math
 import pytest
 
 from mcstudy import text, units
+from mcstudy.statistics import Estimate
+from mcstudy.typed_json import from_plain
 
 NONE = (None, math.nan)
 
@@ -44,7 +46,9 @@ def test_an_estimate_has_its_interval_where_there_is_one(
     write: object, estimate: tuple[float | None, ...], expected: str
 ) -> None:
     assert callable(write)
-    assert write(dict(zip(("value", "low", "high"), estimate, strict=True))) == expected
+    # JSON has null where a number does not exist.
+    read = from_plain(Estimate, dict(zip(("value", "low", "high"), estimate, strict=True)))
+    assert write(read) == expected
 
 
 @pytest.mark.parametrize(("unit", "target", "expected"), [

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.injury import association
 from models.registry import load_model
-from studies import cli, kind, stiffness, worker
+from studies import cli, kind, worker
 from studies.diagnosis import study as diagnosis
 from studies.injury import speed as injury_speed
 from studies.kinds import KINDS, parse_study
@@ -33,6 +33,8 @@ from studies.publishing import publish
 from studies.risk_curve import study as risk_curve
 from studies.sensitivity import measure as sensitivity
 from studies.sobol import analysis as sobol_analysis
+from studies.stiffness_fit import fits
+from studies.stiffness_fit import study as stiffness
 
 SPREADS = {"impact_speed": 0.12, "headform_mass": 0.2, "hood_force_scale": 0.3}
 EXPONENTS = {
@@ -133,9 +135,10 @@ def study_text(
 
 
 def run_text(text: str, folder: ResultsFolder, *, workers: int = 1) -> dict[str, Any]:
-    """Run a study file of any sampled kind."""
+    """Run a study file of any sampled kind and return its analysis as it is in the folder."""
     study = parse_study(text)
-    return KINDS[study.kind].run(study, text, folder, workers=workers, quiet=True)
+    KINDS[study.kind].run(study, text, folder, workers=workers, quiet=True)
+    return folder.read_json("analysis.json")
 
 
 GRAZING = 0.5
@@ -281,10 +284,10 @@ def without_figures() -> Iterator[None]:
 @contextlib.contextmanager
 def quick_fits(draws: int = 4) -> Iterator[None]:
     """Fit stiffness with few repetitions and without figures."""
-    quick = partial(stiffness.fit_stiffness, draws=draws)
+    quick = partial(fits.fit_stiffness, draws=draws)
     with (
-        mock.patch.object(stiffness, "fit_stiffness", quick),
-        mock.patch.object(stiffness, "_draw", lambda *_: mock.MagicMock()),
+        mock.patch.object(fits, "fit_stiffness", quick),
+        mock.patch.object(stiffness, "draw", lambda *_: mock.MagicMock()),
     ):
         yield
 

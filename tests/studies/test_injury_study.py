@@ -27,20 +27,23 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.special import expit, ndtr
 
+from mcstudy.execution.failures import Failures
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.injury.functions import RiskFunction
+from mcstudy.typed_json import from_plain, to_plain
 from models.headform.model import HeadformModel
 from models.registry import load_model
 from studies.injury import analysis as injury_analysis
-from studies.injury import report as injury_report
+from studies.injury import pictures as injury_pictures
 from studies.injury import speed as injury_speed
 from studies.injury import study as injury
 from studies.injury.analysis import analyse, outcomes_of
 from studies.injury.cells import cells_of
+from studies.injury.numbers import InjuryAnalysis
 from studies.injury.schema import InjuryStudy
 from studies.kinds import parse_study
 from studies.monte_carlo.design import sample_inputs
-from studies.runs import load_study_model
+from studies.runs import RunEnds, load_study_model
 
 Array = NDArray[np.float64]
 
@@ -193,13 +196,18 @@ def frame_of(text: str) -> tuple[InjuryStudy, pd.DataFrame, dict[str, RiskFuncti
     return study, outcomes_of(study, pd.concat(frames, ignore_index=True), functions), functions
 
 
+ENDED = RunEnds("injury", 0, {}, [], Failures(0, 0.0, 0, {}, {}))
+
+
 def analysed(text: str, *without: str) -> dict[str, Any]:
     """Return numbers of a study by formula, without associations, speeds and what else is named."""
     study, cases, functions = frame_of(text)
     with contextlib.ExitStack() as stack:
         for name in ("_associations", "describe_speed", *without):
             stack.enter_context(mock.patch.object(injury_analysis, name, lambda *_: {}))
-        return analyse(study, load_study_model(study), cases, functions)
+        found = analyse(study, load_study_model(study), ENDED, cases, functions)
+    plain: dict[str, Any] = to_plain(found)
+    return plain
 
 
 def t_interval(batches: Array) -> tuple[float, float]:
@@ -866,7 +874,9 @@ def test_a_head_that_is_never_struck_is_drawn(tmp_path: Path) -> None:
     folder, study = ran(tmp_path, text), parse_study(text)
     assert isinstance(study, InjuryStudy)
     functions = injury.check_functions(study, load_study_model(study))
-    figures = injury_report.draw(study, cases_of(folder), analysis_of(folder), functions)
+    figures = injury_pictures.draw(
+        study, cases_of(folder), folder.read_analysis(InjuryAnalysis), functions
+    )
     for figure in figures.values():
         figure.draw_without_rendering()
     entry = scenario_of(folder)
@@ -882,7 +892,9 @@ def test_any_title_can_be_drawn(full: ResultsFolder) -> None:
     for name, title in zip(analysis["scenarios"], titles, strict=True):
         analysis["scenarios"][name]["title"] = title
     functions = injury.check_functions(study, load_study_model(study))
-    figures = injury_report.draw(study, cases_of(full), analysis, functions)
+    figures = injury_pictures.draw(
+        study, cases_of(full), from_plain(InjuryAnalysis, analysis), functions
+    )
     for name in ("exceedance", "ais"):
         figures[name].draw_without_rendering()
 

@@ -15,6 +15,7 @@ from models.registry import load_model
 from studies import api
 from studies.kind import Finished
 from studies.kinds import load_study, parse_study
+from studies.model_comparison.numbers import ComparisonAnalysis
 from studies.model_comparison.schema import ModelComparison
 from studies.model_comparison.study import NOMINAL, Comparison
 
@@ -185,7 +186,9 @@ def test_two_crash_models_are_compared_and_drawn_with_any_workers(tmp_path: Path
     study = load_study(path)
     assert isinstance(study, ModelComparison)
     comparison = Comparison()
-    done = Finished(study, comparison.results(study, folder), analysis)
+    done = Finished(
+        study, comparison.results(study, folder), folder.read_analysis(ComparisonAnalysis)
+    )
     figures = comparison.draw(done)
     assert {"kinematics_spatial", "kinematics_planar"} <= set(figures)
     assert cell(folder, "planar").read_json(NOMINAL)["scene"]["names"][0] == "hip"

@@ -10,6 +10,7 @@ from mcstudy.execution.results import ResultsFolder
 from models.registry import load_model
 from studies.kind import Finished
 from studies.kinds import load_study
+from studies.monte_carlo.analysis import MonteCarloAnalysis
 from studies.monte_carlo.schema import MonteCarloStudy
 from studies.monte_carlo.study import MonteCarlo
 
@@ -51,8 +52,7 @@ def test_analysis_judges_the_accident(folder: ResultsFolder) -> None:
 def test_every_figure_is_made(folder: ResultsFolder) -> None:
     study, kind = load_study(folder.path / "study.toml"), MonteCarlo()
     assert isinstance(study, MonteCarloStudy)
-    runs, analysis = kind.results(study, folder), folder.read_json("analysis.json")
-    done = Finished(study, runs, analysis)
+    done = Finished(study, kind.results(study, folder), folder.read_analysis(MonteCarloAnalysis))
     figures = kind.draw(done)
     assert {"impact_speed", "throw_and_wad"} <= set(figures)
     shown = [f for part in kind.sections(done, figures) for f in part.figures]

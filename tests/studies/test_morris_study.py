@@ -21,8 +21,10 @@ from scipy import special
 
 from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.results import ResultsFolder
+from mcstudy.typed_json import from_plain
 from studies import api
 from studies.morris import report as morris_report
+from studies.morris.analysis import MorrisAnalysis, RankedOutput
 
 BLOCK = 5
 """Rows of a trajectory: its start, three inputs and the dummy."""
@@ -149,7 +151,9 @@ def test_groups_alone_are_drawn(tmp_path: Path, fast: None) -> None:
     results = ResultsFolder(tmp_path / "groups")
     analysis = run_text(plain(8, more=more, outputs=("hic15",)), results)
     assert analysis["factors"] == ["all", "dummy"]
-    assert {"mean_effects", "elementary_effects"} == set(morris_report.draw(analysis))
+    assert {"mean_effects", "elementary_effects"} == set(
+        morris_report.draw(from_plain(MorrisAnalysis, analysis))
+    )
 
 
 def test_a_child_on_the_road_in_few_runs(tmp_path: Path, undrawn: None) -> None:
@@ -216,7 +220,7 @@ def test_trajectories_with_a_failed_run_are_left_out_whole(failing: ResultsFolde
     html = (failing.path / "report.html").read_text()
     assert "runs failed" in html
     assert "hood force scale low" in html
-    assert "failures" in morris_report.draw(analysis)
+    assert "failures" in morris_report.draw(from_plain(MorrisAnalysis, analysis))
 
 
 def test_an_output_with_too_few_values_is_not_ranked(
@@ -279,7 +283,7 @@ def test_a_sentence_ranks_says_what_is_curved_and_names_the_weak() -> None:
             "dummy": effect(0.12, 0.03, clear=False),
         },
     }
-    text = morris_report.sentence("throw_distance", entry)
+    text = morris_report.sentence("throw_distance", from_plain(RankedOutput, entry))
     assert text.startswith(
         "Throw distance is most sensitive to impact speed (5.00 ± 0.50 m), gait phase "
         "(2.00 ± 0.25 m), child (1.00 ± 0.20 m)."
@@ -300,10 +304,10 @@ def test_a_sentence_names_at_most_four_factors_and_no_weak_ones_if_there_are_non
         "factors": {f"input_{k}": effect(10.0 - k, 0.1, clear=True) for k in range(6)}
         | {"dummy": effect(0.0, 0.0, clear=False)},
     }
-    text = morris_report.sentence("hic15", entry)
+    text = morris_report.sentence("hic15", from_plain(RankedOutput, entry))
     assert "input 3" in text
     assert "input 4" not in text
     assert "Not distinguishable" not in text
     noise = {"age": effect(0.1, 0.1, clear=False), "dummy": effect(0.1, 0.1, clear=False)}
-    text = morris_report.sentence("hic15", entry | {"factors": noise})
+    text = morris_report.sentence("hic15", from_plain(RankedOutput, entry | {"factors": noise}))
     assert text == "HIC15: no factor is distinguishable from noise."

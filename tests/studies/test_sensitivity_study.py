@@ -31,8 +31,10 @@ from headform_studies import (
 from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.sensitivity import delta, given_data
+from mcstudy.typed_json import from_plain, to_plain
+from studies.sensitivity import measure as given_data_study
 from studies.sensitivity import report as sensitivity_report
-from studies.sensitivity.measure import measure_sensitivity
+from studies.sensitivity.analysis import MeasuredOutput
 
 DESIGNS = {
     "monte-carlo": 'method = "monte-carlo"\nn = 512',
@@ -56,6 +58,14 @@ def formula() -> Iterator[None]:
     """Run every study by formula."""
     with by_formula():
         yield
+
+
+def measure_sensitivity(
+    source: ResultsFolder, out: ResultsFolder | None = None, **options: Any
+) -> dict[str, Any]:
+    """Return the analysis as it is in JSON."""
+    plain: dict[str, Any] = to_plain(given_data_study.measure_sensitivity(source, out, **options))
+    return plain
 
 
 @pytest.fixture
@@ -302,9 +312,9 @@ def test_report_is_self_contained_and_drawn(drawn: tuple[ResultsFolder, dict[str
     assert len(re.findall(r"<td", row.group(1))) == len(MEASURES)
 
 
-def made_up(**rows: tuple[float, bool, bool, bool]) -> dict[str, Any]:
+def made_up(**rows: tuple[float, bool, bool, bool]) -> MeasuredOutput:
     """Return an entry of inputs with a first-order value and what is clear in each measure."""
-    return {
+    plain = {
         "unit": "1",
         "runs": 500,
         "measures": {
@@ -319,6 +329,7 @@ def made_up(**rows: tuple[float, bool, bool, bool]) -> dict[str, Any]:
             for k, measure in enumerate(MEASURES)
         },
     }  # fmt: skip
+    return from_plain(MeasuredOutput, plain)
 
 
 def test_a_sentence_names_shares_shape_and_none() -> None:

@@ -31,6 +31,7 @@ from headform_studies import (
 
 from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder, digest
+from mcstudy.typed_json import from_plain
 from models.registry import load_model
 from studies import api
 from studies.failure_report import failure_map
@@ -38,6 +39,7 @@ from studies.kind import Finished
 from studies.kinds import KINDS, parse_study
 from studies.sobol import report as sobol_report
 from studies.sobol import study as sobol
+from studies.sobol.analysis import IndexedOutput, SobolAnalysis
 
 BLOCK = 6
 """Rows of a base point: A, B, three inputs and the dummy."""
@@ -197,7 +199,7 @@ def test_a_group_of_dependent_inputs_has_the_index_of_its_sum(tmp_path: Path, fa
 
 
 def test_every_figure_is_made(folder: ResultsFolder) -> None:
-    study, kind, analysis = parse_study(SECOND), KINDS["sobol"], folder.read_json("analysis.json")
+    study, kind, analysis = parse_study(SECOND), KINDS["sobol"], folder.read_analysis(SobolAnalysis)
     figures = sobol_report.draw(analysis)
     wanted = {"indices", "heatmap", "convergence", "main_effects_hic15", "second_order_hic15"}
     assert set(figures) == wanted
@@ -395,8 +397,8 @@ def made_up(
     unit: str = "1",
     variance: float = 1e4,
     noise_sd: float = 0.1,
-) -> dict[str, Any]:
-    return {
+) -> IndexedOutput:
+    plain = {
         "unit": unit,
         "base_points": 256,
         "variance": variance,
@@ -408,6 +410,7 @@ def made_up(
         "first": {name: estimate(*pair) for name, pair in first.items()},
         "total": {name: estimate(*pair) for name, pair in total.items()},
     }
+    return from_plain(IndexedOutput, plain)
 
 
 def test_a_sentence_names_shares_largest_first_and_weak_factors() -> None:

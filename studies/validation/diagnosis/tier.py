@@ -13,8 +13,9 @@ from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import run_jobs
 from mcstudy.figures.panels import Curve, Panel, draw_panels
 from mcstudy.report import Section, Table
-from mcstudy.statistics import probability
+from mcstudy.statistics import Estimate, probability
 from mcstudy.text import number, percent
+from mcstudy.typed_json import from_plain
 from studies.publishing import publish
 from studies.validation.diagnosis.trial import Outcome, Trial, run_trial
 
@@ -134,7 +135,7 @@ def analyse(outcomes: Sequence[Outcome]) -> dict[str, Any]:
             "most": target.high,
             "met": target.low <= rate.value <= target.high,
             "allowed": rate.low <= target.high and rate.high >= target.low,
-            **rate.as_dict(),
+            **vars(rate),
         }
     return {
         "rates": rates,
@@ -168,7 +169,7 @@ def _power(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
         if part:
             rate = probability(np.array([o.detected for o in part]))
             middle = float(np.median([o.size for o in part]))
-            rows.append({"size": middle, "trials": len(part), **rate.as_dict()})
+            rows.append({"size": middle, "trials": len(part), **vars(rate)})
     return rows
 
 
@@ -188,7 +189,7 @@ def _draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
 def summarise(analysis: Mapping[str, Any]) -> list[Table]:
     """Return rates against targets and the confusion of names."""
     rates = [
-        [row["what"], str(row["trials"]), percent(row), _wanted(row),
+        [row["what"], str(row["trials"]), percent(from_plain(Estimate, row)), _wanted(row),
          "met" if row["met"] else "within its interval" if row["allowed"] else "MISSED"]
         for row in analysis["rates"].values()
     ]  # fmt: skip

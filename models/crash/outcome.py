@@ -19,6 +19,7 @@ from models.criteria import (
     filter_cfc,
     impact_angle,
 )
+from models.criteria.filters import settling_time
 from models.criteria.hic import cumulative_area, maximise_window
 from models.criteria.sampling import resultant, sample_record
 from models.criteria.units import STANDARD_GRAVITY
@@ -46,6 +47,8 @@ ANGULAR_CLASS = 180.0
 it to the user and the case does not state it)."""
 HIGHEST_CLASS = 2400.0
 """Channel frequency class whose corner lies just below half the sampling rate."""
+FORGOTTEN = 1e-40
+"""Share of a filter's response that no digit of a double precision signal holds."""
 SHORTEST_PHASE = 40
 """Samples below which a phase is too short to filter."""
 
@@ -155,37 +158,34 @@ class Signals:
         return sample_record(self._raw.record, first, columns, grid)
 
     @functools.cached_property
-    def _motion(self) -> Array:
-        """Head acceleration, angular velocity and angular acceleration (n, 9), unfiltered."""
-        return self.sampled(Column.ACCELERATION, 9, self.head_time)
-
-    def _unfiltered(self, column: Column) -> Array:
-        """Return one of these signals (n, 3)."""
-        first = column - Column.ACCELERATION
-        return self._motion[:, first : first + 3]
-
-    @functools.cached_property
     def acceleration(self) -> Array:
         """Resultant acceleration (n,) in g."""
         raw = self._raw
-        felt = Reading(self._unfiltered(Column.ACCELERATION) / STANDARD_GRAVITY, raw.classes.linear)
+        true = self.sampled(Column.ACCELERATION, 3, self.head_time)
+        true /= STANDARD_GRAVITY
+        felt = Reading(true, raw.classes.linear)
         read = record_reading(raw.chain, raw.values, felt, SAMPLING_RATE, origin=0)
         return resultant(read.acceleration)
 
-    def _angular(self, column: Column) -> Array:
-        signal = self._unfiltered(column)
+    @functools.cached_property
+    def angular(self) -> Array:
+        """Angular velocity in rad/s and acceleration in rad/s2 (n, 6), own axes."""
+        return self._angular(self.head_time)
+
+    @functools.cached_property
+    def primary_angular(self) -> Array:
+        """The same of the primary phase; later samples that do not change it are left out."""
         frequency_class = self._raw.classes.angular
-        return filter_cfc(signal, SAMPLING_RATE, frequency_class) if frequency_class else signal
+        beyond = settling_time(frequency_class, FORGOTTEN) if frequency_class else 0.0
+        end = self.split + int(beyond * SAMPLING_RATE) + 1
+        return self._angular(self.head_time[:end])[: self.split]
 
-    @functools.cached_property
-    def spin(self) -> Array:
-        """Angular velocity (n, 3) in rad/s, own axes."""
-        return self._angular(Column.SPIN)
-
-    @functools.cached_property
-    def spin_rate(self) -> Array:
-        """Angular acceleration (n, 3) in rad/s2, own axes."""
-        return self._angular(Column.SPIN_RATE)
+    def _angular(self, time: Array) -> Array:
+        signal = self.sampled(Column.SPIN, 6, time)
+        frequency_class = self._raw.classes.angular
+        if not frequency_class:
+            return signal
+        return filter_cfc(signal, SAMPLING_RATE, frequency_class, overwrite=True)
 
 
 def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
@@ -231,9 +231,9 @@ def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
         "clip_3ms": lambda: clip("cumulative"),
         "clip_3ms_consecutive": lambda: clip("consecutive"),
         "peak_head_acceleration": lambda: float(signals.acceleration[car].max()),
-        "head_angular_velocity": lambda: float(resultant(signals.spin[car]).max()),
-        "head_angular_acceleration": lambda: float(resultant(signals.spin_rate[car]).max()),
-        "bric": lambda: brain_injury_criterion(signals.spin[car]),
+        "head_angular_velocity": lambda: float(resultant(signals.primary_angular[:, :3]).max()),
+        "head_angular_acceleration": lambda: float(resultant(signals.primary_angular[:, 3:]).max()),
+        "bric": lambda: brain_injury_criterion(signals.primary_angular[:, :3]),
         "throw_distance": throw,
         "launch_speed": lambda: float(
             (np.diff(record[:, Column.CENTRE]) / np.diff(record[:, Column.TIME])).max()
@@ -309,14 +309,14 @@ def histories(
         return lambda: signals.sampled(k, 1, time)[:, 0]
 
     def spin(k: int) -> Callable[[], Array]:
-        return lambda: signals.spin[:, k]
+        return lambda: signals.angular[:, k]
 
     zones, head = raw.scenario.vehicle.zones, signals.head_time
     head_channels: dict[str, tuple[str, Callable[[], Array]]] = {
         "acceleration": ("g", lambda: signals.acceleration),
-        "angular_velocity": ("rad/s", lambda: resultant(signals.spin)),
+        "angular_velocity": ("rad/s", lambda: resultant(signals.angular[:, :3])),
         **{f"angular_velocity_{axis}": ("rad/s", spin(k)) for k, axis in enumerate("xyz")},
-        "angular_acceleration": ("rad/s2", lambda: resultant(signals.spin_rate)),
+        "angular_acceleration": ("rad/s2", lambda: resultant(signals.angular[:, 3:])),
         "velocity_relative_to_car": (
             "m/s",
             lambda: resultant(signals.sampled(Column.RELATIVE_VELOCITY, 3, head)),

@@ -22,14 +22,21 @@ SETTLED = 1e-3
 """Remaining share of a step response after the settling time."""
 
 
-def settling_time(frequency_class: float) -> float:
+def settling_time(frequency_class: float, left: float = SETTLED) -> float:
     """Return the time (s) by which a filter's response extends before and after an event.
 
     The poles of a second-order Butterworth filter decay at its corner frequency over the square
     root of two.
+
+    Parameters
+    ----------
+    frequency_class : float
+        Channel frequency class.
+    left : float
+        Share of the response that is left after that time.
     """
     decay = 2.0 * math.pi * CUTOFF_FACTOR * frequency_class / math.sqrt(2.0)
-    return math.log(1.0 / SETTLED) / decay
+    return math.log(1.0 / left) / decay
 
 
 @functools.cache
@@ -127,7 +134,13 @@ def _there_and_back(section, signal, longer, filtered):
                 filtered[k - pad, c0], filtered[k - pad, c1], filtered[k - pad, c2] = u, v, w
 
 
-def filter_cfc(signal: ArrayLike, sampling_rate: float, frequency_class: float = 1000.0) -> Array:
+def filter_cfc(
+    signal: ArrayLike,
+    sampling_rate: float,
+    frequency_class: float = 1000.0,
+    *,
+    overwrite: bool = False,
+) -> Array:
     """Return the signal filtered by a channel frequency class, forwards and backwards.
 
     Parameters
@@ -139,6 +152,8 @@ def filter_cfc(signal: ArrayLike, sampling_rate: float, frequency_class: float =
     frequency_class : float
         60, 180, 600 or 1000 in the standard; the combined gain is -3 dB near 1.65 times the class
         and -6 dB at 2.0775 times it.
+    overwrite : bool
+        Whether an array may be filtered in place; fresh memory costs as much as the filter.
 
     Raises
     ------
@@ -155,7 +170,7 @@ def filter_cfc(signal: ArrayLike, sampling_rate: float, frequency_class: float =
     x = np.asarray(signal, dtype=np.float64)
     section = _sections(float(frequency_class), float(sampling_rate))
     columns = x.reshape(x.shape[0], -1)
-    filtered = np.empty_like(columns)
+    filtered = columns if overwrite else np.empty_like(columns)
     longer = np.empty((x.shape[0] + 2 * min(x.shape[0] - 1, PADDING), 3))
     _there_and_back(section, columns, longer, filtered)
     return filtered.reshape(x.shape)

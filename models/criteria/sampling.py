@@ -9,30 +9,34 @@ Array = NDArray[np.float64]
 
 
 @unfused_kernel
-def _interpolate(grid, time, record, first, slope, out):
+def _interpolate(grid, record, first, slope, out):
     """Fill ``out`` (n, k) with columns ``first`` to ``first + k`` of a record, linear in time.
 
     ``slope`` (k,) is workspace for the slopes between two rows.
     """
     i, n, columns = 0, grid.size, out.shape[1]
-    while i < n and grid[i] <= time[0]:
+    while i < n and grid[i] <= record[0, 0]:
         for k in range(columns):
             out[i, k] = record[0, first + k]
         i += 1
-    for j in range(time.size - 1):
+    last = record.shape[0] - 1
+    for j in range(last):
+        start, end = record[j, 0], record[j + 1, 0]
         if i == n:
             return
-        if grid[i] >= time[j + 1]:
+        if grid[i] >= end:
             continue
         for k in range(columns):
-            slope[k] = (record[j + 1, first + k] - record[j, first + k]) / (time[j + 1] - time[j])
-        while i < n and grid[i] < time[j + 1]:
-            away = grid[i] - time[j]
+            slope[k] = (record[j + 1, first + k] - record[j, first + k]) / (end - start)
+        if grid[i] <= start:
             for k in range(columns):
-                value = record[j, first + k]
-                out[i, k] = slope[k] * away + value if away > 0.0 else value
+                out[i, k] = record[j, first + k]
             i += 1
-    last = time.size - 1
+        while i < n and grid[i] < end:
+            away = grid[i] - start
+            for k in range(columns):
+                out[i, k] = slope[k] * away + record[j, first + k]
+            i += 1
     while i < n:
         for k in range(columns):
             out[i, k] = record[last, first + k]
@@ -65,8 +69,8 @@ def sample_record(record: Array, first: int, columns: int, grid: Array) -> Array
     (n, columns) array
     """
     out = np.empty((grid.size, columns))
-    time = np.ascontiguousarray(record[:, 0])
-    _interpolate(grid, time, record, first, np.empty(columns), out)
+    # Numba needs half a millisecond for the type of an enumeration's member.
+    _interpolate(grid, record, int(first), np.empty(columns), out)
     return out
 
 

@@ -19,7 +19,7 @@ class Reading:
     Attributes
     ----------
     acceleration : (n, axes) array
-        g.
+        g; overwritten by its record.
     channel_class : float
         Channel frequency class of the filter, 0 for none.
     clock : float
@@ -73,7 +73,7 @@ def record_reading(
     signal = reading.acceleration
     # A filter whose corner lies above half the sampling rate is left out.
     if 0.0 < CUTOFF_FACTOR * reading.channel_class < 0.5 * sampling_rate:
-        signal = filter_cfc(signal, sampling_rate, reading.channel_class)
+        signal = filter_cfc(signal, sampling_rate, reading.channel_class, overwrite=True)
     if reading.clock != 1.0:
         columns = [retime(column, reading.clock, origin) for column in signal.T]
         signal = np.stack(columns, axis=1)

@@ -292,6 +292,16 @@ def test_running_body_moves_on_the_road_as_its_change_in_time_says(phase: float)
     assert np.abs(at.angular_velocity).max() > 1.0
 
 
+@pytest.mark.parametrize("phase", PHASES)
+def test_the_trunk_leans_and_the_face_stays_upright(phase: float) -> None:
+    up = turns(run(phase)).as_matrix()[:, 2, 2]
+    lean = math.acos(up[0])
+    assert 0.02 < lean < 0.3
+    # Two neck joints share the rotation.
+    assert math.acos(up[SEGMENTS.index("neck")]) == pytest.approx(0.5 * lean)
+    assert up[HEAD] == pytest.approx(1.0, abs=1e-12)
+
+
 def test_gait_repeats_after_a_cycle_and_swaps_sides_after_half() -> None:
     one, half, cycle = run(0.2), run(0.7), run(1.2)
     np.testing.assert_allclose(cycle.orientation, one.orientation, atol=1e-12)

@@ -98,3 +98,9 @@ def test_intervals_count_the_uncertainty_of_the_speed() -> None:
     assert wide.largest.high - wide.largest.low > 1.5 * LARGEST * 0.2 / SPEED
     assert wide.largest.low < LARGEST < wide.largest.high
     assert wide.permanent.low < PERMANENT < wide.permanent.high
+
+
+def test_the_residual_behind_a_filter_is_a_force() -> None:
+    noise = np.random.default_rng(4).standard_normal(TIME.size)
+    fit = fitted(filtered(pulse(TIME), RATE, 60.0) + 2.0 * noise, 60.0, draws=0)
+    assert fit.residual == pytest.approx(2.0 * GRAVITY * MASS, rel=0.15)

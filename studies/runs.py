@@ -188,8 +188,8 @@ def run_rows(
     )
     complete = complete_status(model)
     manifest = _manifest(study, model, numbers_digest(study, model), design, workers)
-    spent = folder.read_json("manifest.json") if (folder.path / "manifest.json").exists() else {}
-    manifest["wall_time_s"] = spent.get("wall_time_s", 0.0)
+    earlier = folder.read_json("manifest.json") if (folder.path / "manifest.json").exists() else {}
+    manifest["wall_time_s"] = earlier.get("wall_time_s", 0.0)
     folder.write_json("manifest.json", manifest)
     start = time.perf_counter()
     with parallel_backend(workers):

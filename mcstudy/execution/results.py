@@ -206,6 +206,8 @@ class ResultsFolder:
             If the folder holds no runs, or a column is missing or holds something else.
         """
         found = self.done()
+        if found is None and (self.path / RUNS).exists():
+            raise UserError(f"{self.path / RUNS}: is no table of runs; run the study again")
         if found is None or found.empty:
             raise UserError(f"{self.path}: holds no runs; run the study first")
         for name in numbers:

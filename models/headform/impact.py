@@ -99,7 +99,7 @@ def strike(impactor, surface, laws, count, rate, slide, step, stride, record, su
         Filled; END_TIME is NaN if the record is full before the contact ends.
     """
     mass, radius = impactor.mass, impactor.radius
-    depth, deepest, spin, spent = 0.0, 0.0, 0.0, 0.0
+    depth, deepest, spin, absorbed = 0.0, 0.0, 0.0, 0.0
     force, drag, power = 0.0, 0.0, 0.0
     samples = 0
     summary[END_TIME] = math.nan
@@ -136,7 +136,7 @@ def strike(impactor, surface, laws, count, rate, slide, step, stride, record, su
             spin = old_spin + half * (old_drag + drag) * radius / impactor.inertia
         power = force * rate + drag * (slide - radius * spin)
         if k > 0:
-            spent += 0.5 * step * (old_power + power)
+            absorbed += 0.5 * step * (old_power + power)
         if k % stride == 0 and samples < record.shape[0]:
             record[samples, NORMAL] = force
             record[samples, TANGENTIAL] = drag
@@ -153,4 +153,4 @@ def strike(impactor, surface, laws, count, rate, slide, step, stride, record, su
     summary[REBOUND] = -rate
     summary[END_SLIDE] = slide
     summary[END_SPIN] = spin
-    summary[ABSORBED] = spent
+    summary[ABSORBED] = absorbed

@@ -34,7 +34,7 @@ class PlanarBody(NamedTuple):
         About y through the centre of mass, kg m2.
     normal : (n, 3) array
         The plane's normal y in the segment's own axes, constant.
-    shadow : (n, 3) array
+    projection : (n, 3) array
         Shape entries xx, xz, zz of the ellipsoid's projection onto the plane at the start, m2.
     offset : (n, 2) array
         Ellipsoid's centre from the centre of mass at the start, m.
@@ -63,7 +63,7 @@ class PlanarBody(NamedTuple):
     mass: Array
     inertia: Array
     normal: Array
-    shadow: Array
+    projection: Array
     offset: Array
     breadth: Array
     side: Array
@@ -109,7 +109,7 @@ def hold_in_plane(body: Body, posture: Posture) -> PlanarBody:
         mass=body.mass.copy(),
         inertia=inertia,
         normal=normal,
-        shadow=np.stack([shape[:, 0, 0], shape[:, 0, 2], shape[:, 2, 2]], axis=1),
+        projection=np.stack([shape[:, 0, 0], shape[:, 0, 2], shape[:, 2, 2]], axis=1),
         offset=offset[:, ::2].copy(),
         breadth=np.stack([middle - half, middle + half], axis=1),
         side=middle,
@@ -169,7 +169,7 @@ def outline(body: PlanarBody, segment: int, corners: int) -> list[tuple[float, f
     list of tuple of float
         x and z from the centre of mass, m.
     """
-    xx, xz, zz = body.shadow[segment]
+    xx, xz, zz = body.projection[segment]
     root = np.linalg.cholesky(np.array([[xx, xz], [xz, zz]]))
     scale = 2.0 / (1.0 + math.cos(math.pi / corners))
     angle = 2.0 * math.pi * np.arange(corners) / corners

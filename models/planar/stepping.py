@@ -226,7 +226,7 @@ def update_motion(body, state, ahead, motion, contacts):
         ox, oz = body.offset[i, 0], body.offset[i, 1]
         contacts.centre[i, 0] = x + c * ox - s * oz
         contacts.centre[i, 2] = z + s * ox + c * oz
-        xx, xz, zz = body.shadow[i, 0], body.shadow[i, 1], body.shadow[i, 2]
+        xx, xz, zz = body.projection[i, 0], body.projection[i, 1], body.projection[i, 2]
         contacts.shape[i, 0] = c * c * xx - 2.0 * c * s * xz + s * s * zz
         contacts.shape[i, 2] = c * s * (xx - zz) + (c * c - s * s) * xz
         # The extent across the plane is arbitrary: there is no contact in that direction.

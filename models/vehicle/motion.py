@@ -41,7 +41,7 @@ def braking_motion(
     friction_tyre_road: float,
     yaw_rate: float,
     rotation_centre: float,
-    pull: float = 0.0,
+    downhill_gravity: float = 0.0,
 ) -> CarMotion:
     """Return the motion of a car that brakes with all wheels at the friction limit.
 
@@ -55,7 +55,7 @@ def braking_motion(
         Yaw rate at impact, positive to the left, rad/s.
     rotation_centre : float
         Distance behind the front, m.
-    pull : float
+    downhill_gravity : float
         Gravity component along the travel of a car on a falling road, m/s2.
 
     Notes
@@ -64,7 +64,9 @@ def braking_motion(
     """
     braking = friction_tyre_road * STANDARD_GRAVITY
     curvature = yaw_rate / impact_speed if impact_speed > 0.0 else 0.0
-    return CarMotion(impact_speed, max(braking - pull, 0.1 * braking), curvature, rotation_centre)
+    return CarMotion(
+        impact_speed, max(braking - downhill_gravity, 0.1 * braking), curvature, rotation_centre
+    )
 
 
 def stopping_distance(motion: CarMotion) -> float:

@@ -112,7 +112,7 @@ def test_a_polygon_has_the_extent_of_the_shadow() -> None:
     plane = hold_in_plane(BODY, posture_of(0.7))
     for i in range(N):
         corners = np.array(outline(plane, i, 16)) - plane.offset[i]
-        xx, xz, zz = plane.shadow[i]
+        xx, xz, zz = plane.projection[i]
         form = np.linalg.inv(np.array([[xx, xz], [xz, zz]]))
         reach = np.sqrt(np.einsum("ki,ij,kj->k", corners, form, corners))
         np.testing.assert_allclose(reach, 1.0, atol=0.011)

@@ -492,7 +492,7 @@ DAMAGE: dict[str, tuple[dict[str, Any], Callable[[Frame], Frame], str]] = {
     "no design": ({"design": 3}, Frame.copy, "has no table 'design'"),
     "cells": ({"design": {"n": 1, "cells": ["../x"]}}, Frame.copy, "must be names of folders"),
     "text": ({}, lambda runs: runs.assign(hic15="x"), "'hic15' of its runs holds no numbers"),
-    "no run": ({}, lambda runs: runs.drop(columns="run"), "holds no runs"),
+    "no run": ({}, lambda runs: runs.drop(columns="run"), "is no table of runs"),
 }  # fmt: skip
 
 

@@ -53,7 +53,7 @@ def _package_digest(base: Path) -> str:
     with contextlib.suppress(OSError):
         return kept.read_text()
     found = digest_of(sources)
-    if _usable(kept.parent):
+    if is_usable(kept.parent):
         # A process that reads it at the same time sees no file or the complete one.
         with tempfile.NamedTemporaryFile("w", dir=kept.parent, delete=False) as file:
             file.write(found)
@@ -61,7 +61,7 @@ def _package_digest(base: Path) -> str:
     return found
 
 
-def _usable(folder: Path) -> bool:
+def is_usable(folder: Path) -> bool:
     """Return whether a folder exists or can be created, and is writable."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -73,7 +73,7 @@ def _usable(folder: Path) -> bool:
         return False
 
 
-def _user_cache() -> Path | None:
+def user_cache() -> Path | None:
     """Return the user's cache folder, or None if no home folder can be found."""
     try:
         return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
@@ -88,7 +88,7 @@ def _cache_folder() -> Path | None:
     """
     name = f"kernels-{_DIGEST}"
     wanted = None if _BASE is None else _BASE / "mcstudy" / name
-    if wanted is not None and _usable(wanted):
+    if wanted is not None and is_usable(wanted):
         return wanted
     user = os.getuid() if hasattr(os, "getuid") else "user"
     why = "there is no home folder" if wanted is None else f"{wanted} cannot be written"
@@ -96,14 +96,14 @@ def _cache_folder() -> Path | None:
         other = Path(tempfile.gettempdir()) / f"mcstudy-{user}-{name}"
     except OSError:
         other = None
-    if other is not None and _usable(other):
+    if other is not None and is_usable(other):
         print(f"mcstudy: {why}: compiled kernels are kept in {other}", file=sys.stderr)
         return other
     print(f"mcstudy: {why}: kernels are compiled anew in every process", file=sys.stderr)
     return None
 
 
-_BASE = _user_cache()
+_BASE = user_cache()
 _DIGEST = _package_digest(_BASE or Path(tempfile.gettempdir()))
 _CACHED = True
 if "NUMBA_CACHE_DIR" not in os.environ:

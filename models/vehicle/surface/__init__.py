@@ -1,0 +1,1 @@
+"""Car surfaces of facets: meshes, their generator and readers, and the distance to them."""

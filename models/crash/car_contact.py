@@ -12,11 +12,13 @@ from models.contact.friction import friction_coefficient
 from models.crash.front import (
     are_joined,
     friction_of,
-    is_near,
+    may_touch,
     patch_count,
     ploughing_of,
+    pressure_point,
     react,
     separation_of,
+    survey,
 )
 from models.crash.surfaces import (
     CAR_NORMAL,
@@ -105,10 +107,11 @@ def apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, po
             for k in range(3):
                 contacts.car_force[i, k] = 0.0
             continue
+        survey(front, ellipsoids, motion, i, cx, cy, cz, cosine, sine)
         for j in range(count):
             engaged = contacts.engaged[i, j]
             contacts.engaged[i, j] = False
-            if not is_near(front, j, reach, cx, cz):
+            if not may_touch(front, j, reach, cx, cz):
                 continue
             separation, nx, ny, nz, px, py, pz, weight, region = separation_of(
                 front, ellipsoids, contacts, j, i, cx, cy, cz, cosine, sine
@@ -132,7 +135,9 @@ def apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, po
             support = nx * (cx - px) + ny * (cy - py) + nz * (cz - pz)
             share = pressure_share(penetration - dent, dent, support)
             # Centre of pressure in world axes, normal and relative velocity there.
-            bx, by, bz = px + share * (cx - px), py + share * (cy - py), pz + share * (cz - pz)
+            bx, by, bz = pressure_point(
+                front, j, share, penetration - dent, px, py, pz, cx, cy, cz
+            )
             qx = car[0] + cosine * bx - sine * by
             qy = car[1] + sine * bx + cosine * by
             mx, my = cosine * nx - sine * ny, sine * nx + cosine * ny

@@ -4,7 +4,7 @@ import numpy as np
 
 from models.compilation import kernel
 from models.contact.geometry import ellipsoid_direction
-from models.crash.front import patch_count, separation_of
+from models.crash.front import patch_count, separation_of, survey
 from models.crash.surfaces import shape_of
 
 SEARCH_AHEAD = 1.5
@@ -35,11 +35,12 @@ def widen_gaps(ellipsoids, contacts):
 
 
 @kernel
-def _touches(front, ellipsoids, contacts, shift):
+def _touches(front, ellipsoids, motion, contacts, shift):
     for i in range(ellipsoids.reach.shape[0]):
         if ellipsoids.surface_law[i, 0] < 0:
             continue
         x, y, z = contacts.centre[i, 0] + shift, contacts.centre[i, 1], contacts.centre[i, 2]
+        survey(front, ellipsoids, motion, i, x, y, z, 1.0, 0.0)
         for j in range(patch_count(front)):
             found = separation_of(front, ellipsoids, contacts, j, i, x, y, z, 1.0, 0.0)
             if found[0] < 0.0 and found[7] > 0.0:
@@ -48,7 +49,7 @@ def _touches(front, ellipsoids, contacts, shift):
 
 
 @kernel
-def first_contact_shift(front, ellipsoids, contacts):
+def first_contact_shift(front, ellipsoids, motion, contacts):
     """Return the shift in x (m) that brings the body just into contact with the car, or NaN.
 
     Parameters
@@ -57,18 +58,20 @@ def first_contact_shift(front, ellipsoids, contacts):
         Geometry of the car's front, one of the types in ``FRONTS``.
     ellipsoids : Ellipsoids
         Surfaces of the segments and their contact laws.
+    motion : Motion
+        Positions of the segments.
     contacts : Contacts
         Ellipsoid centres and shapes; unchanged.
     """
     clear, step = SEARCH_AHEAD, 0.02
-    while not _touches(front, ellipsoids, contacts, clear - step):
+    while not _touches(front, ellipsoids, motion, contacts, clear - step):
         clear -= step
         if clear < SEARCH_BEHIND:
             return np.nan
     low, high = clear - step, clear
     for _ in range(40):
         middle = 0.5 * (low + high)
-        if _touches(front, ellipsoids, contacts, middle):
+        if _touches(front, ellipsoids, motion, contacts, middle):
             low = middle
         else:
             high = middle

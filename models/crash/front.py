@@ -22,16 +22,18 @@ class Answers(NamedTuple):
 
     Attributes
     ----------
-    patch_count, is_near, is_across, separation_of : callable
+    patch_count, survey, may_touch, is_near, separation_of : callable
         Compiled functions.
-    are_joined, friction_of, ploughing_of, react : callable
+    pressure_point, are_joined, friction_of, ploughing_of, react : callable
         Compiled functions.
     """
 
     patch_count: Callable[..., Any]
+    survey: Callable[..., Any]
+    may_touch: Callable[..., Any]
     is_near: Callable[..., Any]
-    is_across: Callable[..., Any]
     separation_of: Callable[..., Any]
+    pressure_point: Callable[..., Any]
     are_joined: Callable[..., Any]
     friction_of: Callable[..., Any]
     ploughing_of: Callable[..., Any]
@@ -41,9 +43,11 @@ class Answers(NamedTuple):
 FRONTS: dict[type, Answers] = {
     Zones: Answers(
         patch_count=zone_front.zone_count,
+        survey=zone_front.zone_survey,
+        may_touch=zone_front.zone_may_touch,
         is_near=zone_front.zone_is_near,
-        is_across=zone_front.zone_is_across,
         separation_of=zone_front.zone_separation,
+        pressure_point=zone_front.zone_pressure_point,
         are_joined=zone_front.zones_are_joined,
         friction_of=zone_front.zone_friction,
         ploughing_of=zone_front.zone_ploughing,
@@ -74,25 +78,46 @@ def patch_count(front):
 
 
 @_answered
-def is_near(front, patch, margin, x, z):
-    """Return whether a point lies within a margin of a patch in side view.
+def survey(front, ellipsoids, motion, segment, cx, cy, cz, cosine, sine):
+    """Look at a segment as a whole before its patches are asked for.
 
     Parameters
     ----------
     front : named tuple
-        Geometry of the car's front.
-    patch : int
-        Row of the patch.
-    margin : float
-        m.
-    x, z : float
-        Point in the car's frame, m.
+        Geometry of the car's front; its workspace is filled.
+    ellipsoids : Ellipsoids
+        Surfaces of the segments and their contact laws.
+    motion : Motion
+        Positions and velocities of the segments.
+    segment : int
+        Row of the segment.
+    cx, cy, cz : float
+        Ellipsoid centre in the car's frame, m.
+    cosine, sine : float
+        Of the car's yaw.
     """
 
 
 @_answered
-def is_across(front, patch, margin, y):
-    """Return whether a point lies within a margin of the width of a patch.
+def may_touch(front, patch, reach, x, z):
+    """Return whether the surveyed segment can be in contact with a patch.
+
+    Parameters
+    ----------
+    front : named tuple
+        Geometry of the car's front.
+    patch : int
+        Row of the patch.
+    reach : float
+        Largest distance of the segment's surface from its centre, m.
+    x, z : float
+        Ellipsoid centre in the car's frame, m.
+    """
+
+
+@_answered
+def is_near(front, patch, margin, x, y, z):
+    """Return whether a point lies within a margin of a patch.
 
     Parameters
     ----------
@@ -102,8 +127,8 @@ def is_across(front, patch, margin, y):
         Row of the patch.
     margin : float
         m.
-    y : float
-        Lateral position in the car's frame, m.
+    x, y, z : float
+        Point in the car's frame, m.
     """
 
 
@@ -132,6 +157,32 @@ def separation_of(front, ellipsoids, contacts, patch, segment, cx, cy, cz, cosin
         ``(separation, nx, ny, nz, px, py, pz, weight, region)``: separation (m, negative in
         contact), normal and deepest point (m) in the car's frame, weight 0 to 1 of the force, and
         region whose law applies.
+    """
+
+
+@_answered
+def pressure_point(front, patch, share, flesh, px, py, pz, cx, cy, cz):
+    """Return the point at which the force of a patch on the surveyed segment acts.
+
+    Parameters
+    ----------
+    front : named tuple
+        Geometry of the car's front.
+    patch : int
+        Row of the patch.
+    share : float
+        From ``models.contact.dent.pressure_share``.
+    flesh : float
+        Penetration of the segment's flesh, m.
+    px, py, pz : float
+        Deepest point in the car's frame, m.
+    cx, cy, cz : float
+        Ellipsoid centre in the car's frame, m.
+
+    Returns
+    -------
+    x, y, z : float
+        In the car's frame, m.
     """
 
 

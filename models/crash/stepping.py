@@ -3,7 +3,7 @@
 import math
 
 from models.compilation import inlined_kernel
-from models.crash.front import is_across, is_near, patch_count
+from models.crash.front import is_near, patch_count
 
 HEAD_NEAR = 0.03
 """Distance (m) from a car zone within which a closing head is stepped finely (assumed)."""
@@ -37,7 +37,7 @@ def head_meets_car(head, ellipsoids, front, car, motion, contacts):
     reach = ellipsoids.reach[head]
     cosine, sine = math.cos(car[2]), math.sin(car[2])
     wx, wy = contacts.centre[head, 0] - car[0], contacts.centre[head, 1] - car[1]
-    x, y = cosine * wx + sine * wy, abs(cosine * wy - sine * wx)
+    x, y = cosine * wx + sine * wy, cosine * wy - sine * wx
     z = contacts.centre[head, 2]
     ux = motion.velocity[head, 0] - car[3] + car[5] * wy
     uy = motion.velocity[head, 1] - car[4] - car[5] * wx
@@ -47,6 +47,6 @@ def head_meets_car(head, ellipsoids, front, car, motion, contacts):
         if contacts.segment_force[head, j] > HEAD_FORCE:
             return True
         margin = reach + HEAD_NEAR
-        if closing and is_near(front, j, margin, x, z) and is_across(front, j, margin, y):
+        if closing and is_near(front, j, margin, x, y, z):
             return True
     return False

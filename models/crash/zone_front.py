@@ -24,7 +24,29 @@ def zone_count(zones):
 
 
 @inlined_kernel
-def zone_is_near(zones, j, margin, x, z):
+def zone_survey(zones, ellipsoids, motion, i, cx, cy, cz, cosine, sine):
+    """Do nothing: every zone is asked for itself.
+
+    Parameters
+    ----------
+    zones : Zones
+        Geometry of the front.
+    ellipsoids : Ellipsoids
+        Surfaces of the segments and their contact laws.
+    motion : Motion
+        Positions and velocities of the segments.
+    i : int
+        Row of the segment.
+    cx, cy, cz : float
+        Ellipsoid centre in the car's frame, m.
+    cosine, sine : float
+        Of the car's yaw.
+    """
+    return
+
+
+@inlined_kernel
+def zone_may_touch(zones, j, margin, x, z):
     """Return whether a point lies within a margin of a zone in side view.
 
     Parameters
@@ -47,8 +69,8 @@ def zone_is_near(zones, j, margin, x, z):
 
 
 @inlined_kernel
-def zone_is_across(zones, j, margin, y):
-    """Return whether a point lies within a margin of a zone's width.
+def zone_is_near(zones, j, margin, x, y, z):
+    """Return whether a point lies within a margin of a zone, in side view and of its width.
 
     Parameters
     ----------
@@ -58,10 +80,32 @@ def zone_is_across(zones, j, margin, y):
         Row of the zone.
     margin : float
         m.
-    y : float
-        Lateral position in the car's frame, m.
+    x, y, z : float
+        Point in the car's frame, m.
     """
-    return abs(y) < zones.half_width[j] + margin
+    return zone_may_touch(zones, j, margin, x, z) and abs(y) < zones.half_width[j] + margin
+
+
+@inlined_kernel
+def zone_pressure_point(zones, j, share, flesh, px, py, pz, cx, cy, cz):
+    """Return the centre of pressure, on the line from the deepest point to the centre.
+
+    Parameters
+    ----------
+    zones : Zones
+        Geometry of the front.
+    j : int
+        Row of the zone.
+    share : float
+        Distance from the deepest point over that of the centre.
+    flesh : float
+        Penetration of the segment's flesh, m.
+    px, py, pz : float
+        Deepest point in the car's frame, m.
+    cx, cy, cz : float
+        Ellipsoid centre in the car's frame, m.
+    """
+    return px + share * (cx - px), py + share * (cy - py), pz + share * (cz - pz)
 
 
 @inlined_kernel

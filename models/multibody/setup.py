@@ -100,7 +100,7 @@ def build_crash(
         widen_gaps(ellipsoids, scratch)
     motion.root_position[1] += scenario.lateral_offset
     _update(tree, ellipsoids, motion, scratch)
-    shift = first_contact_shift(scenario.zones, ellipsoids, scratch)
+    shift = first_contact_shift(scenario.zones, ellipsoids, motion, scratch)
     if np.isnan(shift):
         return None
     motion.root_position[0] += shift

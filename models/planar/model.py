@@ -65,7 +65,7 @@ class PlanarModel(CrashModel):
         contacts, motion = empty_contacts(n, zones, len(ellipsoids.pairs)), empty_motion(n)
         _show(body, motion, contacts)
         widen_gaps(ellipsoids, contacts)
-        shift = first_contact_shift(scenario.zones, ellipsoids, contacts)
+        shift = first_contact_shift(scenario.zones, ellipsoids, motion, contacts)
         if np.isnan(shift):
             return None
         body.centre[:, 0] += shift

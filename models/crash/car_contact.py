@@ -135,9 +135,7 @@ def apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, po
             support = nx * (cx - px) + ny * (cy - py) + nz * (cz - pz)
             share = pressure_share(penetration - dent, dent, support)
             # Centre of pressure in world axes, normal and relative velocity there.
-            bx, by, bz = pressure_point(
-                front, j, share, penetration - dent, px, py, pz, cx, cy, cz
-            )
+            bx, by, bz = pressure_point(front, j, share, penetration - dent, px, py, pz, cx, cy, cz)
             qx = car[0] + cosine * bx - sine * by
             qy = car[1] + sine * bx + cosine * by
             mx, my = cosine * nx - sine * ny, sine * nx + cosine * ny

@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 from numba.extending import overload
 
 from models.compilation import MERGED_FLAGS
-from models.crash import zone_front
+from models.crash import facet_front, zone_front
+from models.crash.facet_front import FacetFront
 from models.vehicle.zones import Zones
 
 
@@ -52,6 +53,18 @@ FRONTS: dict[type, Answers] = {
         friction_of=zone_front.zone_friction,
         ploughing_of=zone_front.zone_ploughing,
         react=zone_front.zone_reaction,
+    ),
+    FacetFront: Answers(
+        patch_count=facet_front.facet_count,
+        survey=facet_front.facet_survey,
+        may_touch=facet_front.facet_may_touch,
+        is_near=facet_front.facet_is_near,
+        separation_of=facet_front.facet_separation,
+        pressure_point=facet_front.facet_pressure_point,
+        are_joined=facet_front.facets_are_joined,
+        friction_of=facet_front.facet_friction,
+        ploughing_of=facet_front.facet_ploughing,
+        react=facet_front.facet_reaction,
     ),
 }
 """Functions of each front geometry, by its type."""

@@ -262,7 +262,7 @@ def _head_contact(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
 
     @functools.cache
     def wad() -> float:
-        dive = raw.chain.act("inputs", raw.values, raw.values)["dive_angle"]
+        dive = raw.scenario.dive_angle
         surface = surface_point(raw.scenario.zones, zone, point[[0, 2]])
         return wrap_around_distance(vehicle.name, zone, static_point(vehicle, dive, surface))
 

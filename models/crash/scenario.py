@@ -40,6 +40,8 @@ class Scenario:
         At first contact, the hips above the origin.
     lateral_offset : float
         Position of the hips to the left of the car's centre line, m.
+    dive_angle : float
+        Of the braking car, nose down, rad.
     """
 
     body: Body
@@ -51,6 +53,7 @@ class Scenario:
     car_motion: CarMotion
     posture: Posture
     lateral_offset: float
+    dive_angle: float
 
 
 def build_scenario(
@@ -113,4 +116,5 @@ def build_scenario(
         ),
         posture=posture,
         lateral_offset=inputs["lateral_offset"],
+        dive_angle=inputs["dive_angle"],
     )

@@ -1,6 +1,7 @@
 """The multibody crash model behind the model protocol."""
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from models import data
 from models.crash import outcome
 from models.crash.model import FRAME_INTERVAL, TIME_LIMIT, CrashModel
 from models.crash.record import Summary
+from models.crash.scenario import Scenario
 from models.declaration import read_channels, read_inputs, read_outputs
 from models.effects.registry import effects_of
 from models.multibody.setup import Crash, build_crash
@@ -37,8 +39,12 @@ class MultibodyModel(CrashModel):
     cost = float(_TABLE["cost"])
 
     def _step(self, values: dict[str, float]) -> outcome.Raw | None:
-        crash = build_crash(values, self.vehicle, self._chain)
+        crash = build_crash(values, self.vehicle, self._chain, self._front)
         return None if crash is None else self.follow(crash, values)
+
+    def _front(self, scenario: Scenario) -> Any:
+        """Return the geometry of the car's front, one of the types of ``models.crash.front``."""
+        return scenario.zones
 
     def follow(self, crash: Crash, values: dict[str, float]) -> outcome.Raw:
         """Return the raw results of an assembled crash, whose state is changed.
@@ -70,7 +76,7 @@ class MultibodyModel(CrashModel):
             mobility=surface_mobility(crash.tree, scenario.body.semi_axes),
         )
         model = CoreModel(
-            crash.tree, scenario.joints, scenario.ellipsoids, scenario.zones, scenario.road,
+            crash.tree, scenario.joints, scenario.ellipsoids, crash.front, scenario.road,
             scenario.car_motion, settings,
         )  # fmt: skip
         pairs = len(scenario.ellipsoids.pairs)

@@ -1,7 +1,8 @@
 """Assembly of a crash: the scenario as the tree of the compiled core at first contact."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from models.multibody.tree import Motion, Tree, empty_motion
 from models.pedestrian.anthropometry import PARENTS, SEGMENTS, Body
 from models.pedestrian.posture import Posture, standing_posture
 from models.vehicle.profile import Vehicle
+from models.vehicle.zones import Zones
 
 
 @dataclass(frozen=True)
@@ -25,12 +27,15 @@ class Crash:
     Attributes
     ----------
     scenario : Scenario
+    front : named tuple
+        Geometry of the car's front, one of the types of ``models.crash.front``.
     tree : Tree
     motion : Motion
         State at first contact.
     """
 
     scenario: Scenario
+    front: Any
     tree: Tree
     motion: Motion
 
@@ -77,8 +82,16 @@ def _update(tree, ellipsoids, motion, contacts):
     update_surfaces(ellipsoids, motion, contacts)
 
 
+def zones_of(scenario: Scenario) -> Zones:
+    """Return the zones of a scenario as the front."""
+    return scenario.zones
+
+
 def build_crash(
-    inputs: Mapping[str, float], vehicle: Vehicle, chain: EffectChain | None = None
+    inputs: Mapping[str, float],
+    vehicle: Vehicle,
+    chain: EffectChain | None = None,
+    front_of: Callable[[Scenario], Any] = zones_of,
 ) -> Crash | None:
     """Return the crash for one set of inputs, or None if the body never touches the car.
 
@@ -89,8 +102,11 @@ def build_crash(
     vehicle : Vehicle
     chain : EffectChain, optional
         Effects that are switched on.
+    front_of : callable
+        Scenario to the geometry of the car's front; by default the zones.
     """
     scenario = build_scenario(inputs, vehicle, chain)
+    front = front_of(scenario)
     ellipsoids = scenario.ellipsoids
     tree = build_tree(scenario.body, scenario.joints.yields)
     motion = place(scenario.posture)
@@ -100,9 +116,9 @@ def build_crash(
         widen_gaps(ellipsoids, scratch)
     motion.root_position[1] += scenario.lateral_offset
     _update(tree, ellipsoids, motion, scratch)
-    shift = first_contact_shift(scenario.zones, ellipsoids, motion, scratch)
+    shift = first_contact_shift(front, ellipsoids, motion, scratch)
     if np.isnan(shift):
         return None
     motion.root_position[0] += shift
     seat_joints(tree, motion)
-    return Crash(scenario, tree, motion)
+    return Crash(scenario, front, tree, motion)

@@ -171,7 +171,7 @@ def _turn(points: Array, angle: float) -> Array:
                      -s * points[..., 0] + c * points[..., 1]], axis=-1)  # fmt: skip
 
 
-def _dive_shift(vehicle: Vehicle, dive_angle: float) -> Array:
+def dive_shift(vehicle: Vehicle, dive_angle: float) -> Array:
     """Return the (x, z) shift after the rotation about the origin that keeps the front at x = 0."""
     pivot = np.array([-vehicle.dive_pivot, 0.0])
     shift = pivot - _turn(pivot, dive_angle)
@@ -196,7 +196,7 @@ def build_zones(
         Factor on the ploughing of all panels.
     """
     table = vehicle.zone_table
-    shift = _dive_shift(vehicle, dive_angle)
+    shift = dive_shift(vehicle, dive_angle)
     origin = _turn(table.origin, dive_angle) + shift
     direction = _turn(table.direction, dive_angle)
     end = origin + table.length[:, None] * direction
@@ -266,7 +266,7 @@ def static_point(vehicle: Vehicle, dive_angle: float, point: Array) -> Array:
     (2,) array
         x and z, m.
     """
-    return _turn(np.asarray(point) - _dive_shift(vehicle, dive_angle), -dive_angle)
+    return _turn(np.asarray(point) - dive_shift(vehicle, dive_angle), -dive_angle)
 
 
 @functools.cache

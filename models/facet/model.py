@@ -1,0 +1,66 @@
+"""The facet crash model behind the model protocol."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from models import data
+from models.crash.facet_front import FacetFront, empty_findings
+from models.crash.scenario import Scenario
+from models.effects.registry import effects_of
+from models.multibody.model import MultibodyModel
+from models.pedestrian.skin import SUBDIVISIONS, build_skin
+from models.vehicle.profile import dive_shift
+from models.vehicle.surface.generator import generate_surface, laws_of_regions
+from models.vehicle.surface.store import load_field
+
+_TABLE = data.load("facet.toml")
+
+
+class FacetModel(MultibodyModel):
+    """The body of the multibody model with a surface of facets against a car of facets.
+
+    See ``CrashModel`` for the other parameters. Inputs and nominal values are those of the
+    multibody model.
+
+    Parameters
+    ----------
+    subdivisions : int
+        Of the icosahedra that are the surface of the segments: 2 gives 162 points a segment.
+
+    Raises
+    ------
+    ValueError
+        If the number of subdivisions is not within 1 to 4.
+    """
+
+    name = "facet"
+    version = f"{MultibodyModel.version}.{_TABLE['version']}"
+    effects: tuple[str, ...] = effects_of("facet")
+    cost = float(_TABLE["cost"])
+
+    def __init__(
+        self,
+        vehicle: str = "family_car_1990s",
+        subdivisions: int = SUBDIVISIONS,
+        **options: Any,
+    ) -> None:
+        if not 1 <= subdivisions <= 4:
+            raise ValueError(f"subdivisions must lie within 1 and 4, given {subdivisions}")
+        super().__init__(vehicle, **options)
+        self.subdivisions = int(subdivisions)
+        self.mesh = generate_surface(vehicle)
+        self._field = load_field(self.mesh, laws_of_regions(self.vehicle, self.mesh))
+        self._found = empty_findings(len(self.vehicle.zones))
+
+    def _front(self, scenario: Scenario) -> FacetFront:
+        dive = scenario.dive_angle
+        return FacetFront(
+            field=self._field,
+            dive=np.array([math.cos(dive), math.sin(dive), *dive_shift(self.vehicle, dive)]),
+            friction=scenario.zones.friction,
+            ploughing=scenario.zones.ploughing,
+            skin=build_skin(scenario.body, self.subdivisions),
+            found=self._found,
+        )

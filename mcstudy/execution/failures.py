@@ -128,7 +128,9 @@ def endings(runs: pd.DataFrame, complete: Collection[str]) -> list[Ending]:
         Statuses that are no failure.
     """
     found = []
-    told = runs["reason"] if "reason" in runs.columns else pd.Series("", index=runs.index)
+    # A table that was joined with one without reasons has holes.
+    known = "reason" in runs.columns
+    told = runs["reason"].fillna("") if known else pd.Series("", index=runs.index)
     for status, count in runs["status"].value_counts().items():
         word = str(status)
         reasons = told[(runs["status"] == status) & (told != "")]

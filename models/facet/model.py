@@ -1,12 +1,14 @@
 """The facet crash model behind the model protocol."""
 
 import math
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
 
 from models import data
 from models.crash.facet_front import FacetFront, empty_findings
+from models.crash.model import TICK
+from models.crash.outcome import ANGULAR_CLASS, LINEAR_CLASS
 from models.crash.scenario import Scenario
 from models.effects.registry import effects_of
 from models.multibody.model import MultibodyModel
@@ -44,11 +46,14 @@ class FacetModel(MultibodyModel):
         self,
         vehicle: str = "family_car_1990s",
         subdivisions: int = SUBDIVISIONS,
-        **options: Any,
+        tick: float = TICK,
+        channel_class: float = LINEAR_CLASS,
+        angular_class: float = ANGULAR_CLASS,
+        effects: Mapping[str, Mapping[str, float]] | None = None,
     ) -> None:
         if not 1 <= subdivisions <= 4:
             raise ValueError(f"subdivisions must lie within 1 and 4, given {subdivisions}")
-        super().__init__(vehicle, **options)
+        super().__init__(vehicle, tick, channel_class, angular_class, effects)
         self.subdivisions = int(subdivisions)
         self.mesh = generate_surface(vehicle)
         self._field = load_field(self.mesh, laws_of_regions(self.vehicle, self.mesh))

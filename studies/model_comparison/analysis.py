@@ -150,14 +150,15 @@ def published_methods(study: ModelComparison, model: Model) -> dict[str, Publish
     for k, table in enumerate(study.tables):
         check_outputs(list(table.units), model, f"tables[{k}].units")
         for name, given in table.units.items():
+            try:
+                factor = units.factor(given, si[name])
+            except ValueError as error:
+                raise UserError(f"tables[{k}].units.{name}: {error}") from None
             rows = [row.values[name] for row in table.rows
                     if row.kind == "simulated" and name in row.values]  # fmt: skip
             if len(rows) < 2:
                 continue
-            try:
-                values = np.array(rows) * units.factor(given, si[name])
-            except ValueError as error:
-                raise UserError(f"tables[{k}].units.{name}: {error}") from None
+            values = np.array(rows) * factor
             scale = scale_of(values)
             scaled = values / scale
             mean, sd = scale * float(scaled.mean()), scale * float(scaled.std(ddof=1))

@@ -8,7 +8,7 @@ import pytest
 from mcstudy_tools import generator
 from numpy.testing import assert_allclose, assert_array_equal
 
-from mcstudy.execution.failures import PARTS, Failures, locate_failures
+from mcstudy.execution.failures import PARTS, Failures, endings, locate_failures
 from mcstudy.execution.results import to_json
 from mcstudy.typed_json import from_plain
 
@@ -126,3 +126,12 @@ def test_failures_of_whole_blocks_count_once(seeds: int) -> None:
 def test_an_input_of_one_value_is_not_located() -> None:
     inputs = pd.DataFrame({"a": np.full(100, 3.0), "b": np.arange(100.0)})
     assert list(locate_failures(inputs, np.arange(100) < 10).where) == ["b"]
+
+
+def test_runs_without_a_reason_beside_runs_with_one_are_counted() -> None:
+    # Two tables joined, of which one has no column of reasons.
+    runs = pd.DataFrame({"status": ["failed", "failed", "ok"], "reason": [None, None, ""]})
+    found = endings(runs, {"ok"})
+    assert [(row.status, row.runs, row.reason) for row in found] == [
+        ("failed", 2, ""), ("ok", 1, ""),
+    ]  # fmt: skip

@@ -116,6 +116,10 @@ def test_published_methods_stand_beside_ours(hoods: ResultsFolder) -> None:
         ('[models.stiff]\nname = "headform"', '[models."../stiff"]\nname = "headform"', "folder"),
         ("peak_force = ", "peak_farce = ", "tables"),
         ('hic15 = "1"', 'hic15 = "m"', "tables"),
+        # A unit is checked in a table without published simulations, too.
+        (TABLES.partition("    { label = \"test\"")[0],
+         '\n[[tables]]\ntitle = "One test"\nunits = { hic15 = "m" }\nrows = [\n',
+         "tables[0].units.hic15"),
         ('kind = "observed"', 'kind = "guessed"', "kind"),
         ("[models.stiff]", "[models.soft]", "soft"),
     ],

@@ -12,7 +12,8 @@ from models.crash.outcome import ANGULAR_CLASS, LINEAR_CLASS
 from models.crash.scenario import Scenario
 from models.effects.registry import effects_of
 from models.multibody.model import MultibodyModel
-from models.pedestrian.skin import SUBDIVISIONS, build_skin
+from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
+from models.pedestrian.skin import FINE, SUBDIVISIONS, build_skin
 from models.vehicle.profile import dive_shift
 from models.vehicle.surface.generator import generate_surface, laws_of_regions
 from models.vehicle.surface.store import load_field
@@ -29,7 +30,8 @@ class FacetModel(MultibodyModel):
     Parameters
     ----------
     subdivisions : int
-        Of the icosahedra that are the surface of the segments: 2 gives 162 points a segment.
+        Of the icosahedra that are the surface of the limbs: 2 gives 162 points a segment. Head and
+        trunk have three at least, 642 points each.
 
     Raises
     ------
@@ -54,7 +56,9 @@ class FacetModel(MultibodyModel):
         if not 1 <= subdivisions <= 4:
             raise ValueError(f"subdivisions must lie within 1 and 4, given {subdivisions}")
         super().__init__(vehicle, tick, channel_class, angular_class, effects)
-        self.subdivisions = int(subdivisions)
+        self._subdivisions = [int(subdivisions)] * len(SEGMENTS)
+        for row in (HEAD, *TRUNK):
+            self._subdivisions[row] = max(int(subdivisions), FINE)
         self.mesh = generate_surface(vehicle)
         self._field = load_field(self.mesh, laws_of_regions(self.vehicle, self.mesh))
         self._found = empty_findings(len(self.vehicle.zones))
@@ -66,6 +70,6 @@ class FacetModel(MultibodyModel):
             dive=np.array([math.cos(dive), math.sin(dive), *dive_shift(self.vehicle, dive)]),
             friction=scenario.zones.friction,
             ploughing=scenario.zones.ploughing,
-            skin=build_skin(scenario.body, self.subdivisions),
+            skin=build_skin(scenario.body, self._subdivisions),
             found=self._found,
         )

@@ -6,6 +6,8 @@ farther from a surface than its radius cannot touch it.
 """
 
 import functools
+import itertools
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +20,9 @@ Index = NDArray[np.int64]
 
 SUBDIVISIONS = 2
 """Default subdivisions of the icosahedron: 162 points and 320 facets a segment."""
+FINE = 3
+"""Subdivisions of head and trunk, 642 points: with 162, HIC15 scatters by a tenth over changes of
+the inputs by 0.3 %, with 642 by 4 % (the multibody model: 3 %)."""
 
 
 class Skin(NamedTuple):
@@ -119,44 +124,71 @@ def segment_mesh(body: Body, segment: int, subdivisions: int = SUBDIVISIONS) -> 
     return nodes * body.semi_axes[segment], facets
 
 
-def build_skin(body: Body, subdivisions: int = SUBDIVISIONS) -> Skin:
+def build_skin(body: Body, subdivisions: Sequence[int]) -> Skin:
     """Return the surface points of all segments of a body.
 
     Parameters
     ----------
     body : Body
-    subdivisions : int
-        Of the icosahedron: 2 give 162 points a segment, 3 give 642.
+    subdivisions : (n,) sequence of int
+        Of the icosahedron, for each segment: 2 give 162 points, 3 give 642.
     """
+    chosen = np.asarray(subdivisions)
+    found: dict[int, _Part] = {}
+    for level in np.unique(chosen).tolist():
+        rows = np.flatnonzero(chosen == level).tolist()
+        found |= dict(zip(rows, _stretch(body.semi_axes[rows], level), strict=True))
+    parts = [found[row] for row in range(len(chosen))]
+    sizes = np.array([len(part.point) for part in parts])
+    clusters = np.array([len(part.centre) for part in parts])
+    ends = np.cumsum(sizes)
+    starts = [
+        part.first[:-1] + before
+        for part, before in zip(parts, (ends - sizes).tolist(), strict=True)
+    ]
+    return Skin(
+        point=np.concatenate([part.point for part in parts]),
+        normal=np.concatenate([part.normal for part in parts]),
+        area=np.concatenate([part.area for part in parts]),
+        centre=np.concatenate([part.centre for part in parts]),
+        radius=np.concatenate([part.radius for part in parts]),
+        first_point=np.append(np.concatenate(starts), ends[-1]),
+        first_cluster=np.concatenate([[0], np.cumsum(clusters)]),
+        grain=np.array([part.area.mean() for part in parts]),
+    )
+
+
+class _Part(NamedTuple):
+    """Points and clusters of one segment; ``first`` (c + 1,) is the first point of each cluster."""
+
+    point: Array
+    normal: Array
+    area: Array
+    centre: Array
+    radius: Array
+    first: Index
+
+
+def _stretch(semi_axes: Array, subdivisions: int) -> list[_Part]:
+    """Return the icosphere stretched to the semi-axes (n, 3) of some segments."""
     nodes, facets = icosphere(subdivisions)
     order, first = _clusters(subdivisions)
-    n, size = len(body.semi_axes), len(nodes)
-    axes = body.semi_axes[:, None, :]
+    size, axes = len(nodes), semi_axes[:, None, :]
     point = nodes[None] * axes
     corners = point[:, facets]
     cross = np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
     third = np.linalg.norm(cross, axis=2) / 6.0
-    area: Array = np.stack(
+    area = np.stack(
         [np.bincount(facets.ravel(), weights=np.repeat(own, 3), minlength=size) for own in third]
     )
     normal = nodes[None] / axes
     normal /= np.linalg.norm(normal, axis=2)[:, :, None]
     point, normal, area = point[:, order], normal[:, order], area[:, order]
-    clusters = len(first) - 1
-    centre = np.empty((n, clusters, 3))
-    radius = np.empty((n, clusters))
-    for c in range(clusters):
-        own = point[:, first[c] : first[c + 1]]
-        centre[:, c] = own.mean(axis=1)
-        radius[:, c] = np.linalg.norm(own - centre[:, c, None], axis=2).max(axis=1)
-    starts = (np.arange(n)[:, None] * size + first[None, :-1]).ravel()
-    return Skin(
-        point=point.reshape(-1, 3),
-        normal=normal.reshape(-1, 3),
-        area=area.ravel(),
-        centre=centre.reshape(-1, 3),
-        radius=radius.ravel(),
-        first_point=np.append(starts, n * size),
-        first_cluster=np.arange(n + 1) * clusters,
-        grain=area.mean(axis=1),
-    )
+    cells = [slice(a, b) for a, b in itertools.pairwise(first.tolist())]
+    centre = np.stack([point[:, cell].mean(axis=1) for cell in cells], axis=1)
+    away = [point[:, cell] - centre[:, c, None] for c, cell in enumerate(cells)]
+    radius = np.stack([np.linalg.norm(part, axis=2).max(axis=1) for part in away], axis=1)
+    return [
+        _Part(point[k], normal[k], area[k], centre[k], radius[k], first)
+        for k in range(len(semi_axes))
+    ]

@@ -28,6 +28,10 @@ ENDS: dict[str, list[tuple[str, dict[str, float]]]] = {
         ("impossible_body", {"body_mass": 9.5, "head_mass": 6.0}),
         ("no_contact", {"lateral_offset": -1.9}),
     ],
+    "facet": [
+        ("impossible_body", {"body_mass": 9.5, "head_mass": 6.0}),
+        ("no_contact", {"lateral_offset": -1.9}),
+    ],
     "planar": [("impossible_body", {"body_mass": 9.5, "head_mass": 6.0})],
 }  # fmt: skip
 LARGE = {"wet_road": 8.0, "sensor_saturation": 60.0}
@@ -221,7 +225,9 @@ def check_range(name: str, n: int) -> None:
         assert ((ok < low) | (ok > high)).any(axis=1).sum() <= 5
 
 
-@pytest.mark.parametrize(("name", "n"), [("headform", 300), ("multibody", 15), ("planar", 15)])
+@pytest.mark.parametrize(
+    ("name", "n"), [("headform", 300), ("multibody", 15), ("planar", 15), ("facet", 15)]
+)
 def test_the_whole_range_gives_numbers(name: str, n: int) -> None:
     check_range(name, n)
 

@@ -22,6 +22,7 @@ from studies.kinds import KINDS, load_study, parse_study
 from studies.published_tables import PublishedTable
 from studies.reconstruction.schema import Reconstruction
 from studies.reconstruction.study import reconstruct, write_reconstruction
+from studies.reconstruction.variants import run_variants
 from studies.runs import columns_of, load_study_model
 
 
@@ -124,7 +125,8 @@ def run_case(
         raise UserError(f"{path}: kind {study.kind!r} is run by 'mcstudy run'")
     folder = results_folder(study, out)
     run, tables = reconstruct(study)
-    write_reconstruction(study, text, run, tables, folder)
+    variants = run_variants(study)
+    write_reconstruction(study, text, run, tables, folder, variants)
     return run, tables, folder
 
 

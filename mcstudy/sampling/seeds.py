@@ -12,6 +12,7 @@ GIVEN_DATA = 3
 MORRIS = 4
 OUTCOME = 5
 AGREEMENT = 6
+PERTURBATION = 7
 
 
 def generator(seed: int, stream: int, index: int = 0) -> np.random.Generator:

@@ -100,6 +100,8 @@ class FacetFront(NamedTuple):
     ploughing : (z,) array
         Share of the ploughing resistance of a lasting dent.
     skin : Skin
+    distributed : (1,) array
+        1 if the points inside the car share the load, 0 if the deepest one carries all of it.
     found : Findings
         Workspace.
     """
@@ -109,6 +111,7 @@ class FacetFront(NamedTuple):
     friction: Array
     ploughing: Array
     skin: Skin
+    distributed: Array
     found: Findings
 
 
@@ -228,6 +231,16 @@ def _add(front, x, y, z, depth, area, gx, gy, gz):
 
 
 @inlined_kernel
+def _carry(front, x, y, z, depth, gx, gy, gz):
+    """Give the whole load to the region of one point, in the static car's frame."""
+    found = front.found
+    j = region_at(front.field, x, y, z)
+    found.pressure[j], found.total[j], found.depth[j] = 1.0, 1.0, depth
+    found.direction[j, 0], found.direction[j, 1], found.direction[j, 2] = gx, gy, gz
+    found.mean[j, 0], found.mean[j, 1], found.mean[j, 2] = x, y, z
+
+
+@inlined_kernel
 def _rotation_of(front, motion, i, cosine, sine, M):
     """Fill the rotation (3, 3) from a segment's axes to the static car's frame."""
     c, s = front.dive[0], front.dive[1]
@@ -276,6 +289,8 @@ def facet_survey(front, ellipsoids, motion, i, cx, cy, cz, cosine, sine):
     M = found.turn
     _rotation_of(front, motion, i, cosine, sine, M)
     least, lx, ly, lz = 1.0, gx, gy, gz
+    dx, dy, dz = x, y, z
+    shared = front.distributed[0] == 1.0
     for c in range(skin.first_cluster[i], skin.first_cluster[i + 1]):
         ux, uy, uz = skin.centre[c, 0], skin.centre[c, 1], skin.centre[c, 2]
         px = x + M[0, 0] * ux + M[0, 1] * uy + M[0, 2] * uz
@@ -292,7 +307,8 @@ def facet_survey(front, ellipsoids, motion, i, cx, cy, cz, cosine, sine):
             depth, gx, gy, gz = distance_at(field, px, py, pz)
             if depth < least:
                 least, lx, ly, lz = depth, gx, gy, gz
-            if depth >= 0.0:
+                dx, dy, dz = px, py, pz
+            if depth >= 0.0 or not shared:
                 continue
             nx, ny, nz = skin.normal[p, 0], skin.normal[p, 1], skin.normal[p, 2]
             facing = -(
@@ -302,26 +318,28 @@ def facet_survey(front, ellipsoids, motion, i, cx, cy, cz, cosine, sine):
             )
             if facing > 0.0:
                 _add(front, px, py, pz, -depth, facing * skin.area[p], gx, gy, gz)
-    # The deepest point of the ellipsoid lies between the points of its mesh.
-    between, tx, ty, tz = False, x, y, z
-    for _ in range(DESCENTS):
+    # The deepest point of an ellipsoid lies between the points of its mesh.
+    between = False
+    for _ in range(DESCENTS if skin.smooth[i] else 0):
         ux = ellipsoids.square[i, 0] * (M[0, 0] * lx + M[1, 0] * ly + M[2, 0] * lz)
         uy = ellipsoids.square[i, 1] * (M[0, 1] * lx + M[1, 1] * ly + M[2, 1] * lz)
         uz = ellipsoids.square[i, 2] * (M[0, 2] * lx + M[1, 2] * ly + M[2, 2] * lz)
-        dx = M[0, 0] * ux + M[0, 1] * uy + M[0, 2] * uz
-        dy = M[1, 0] * ux + M[1, 1] * uy + M[1, 2] * uz
-        dz = M[2, 0] * ux + M[2, 1] * uy + M[2, 2] * uz
-        scale = 1.0 / math.sqrt(lx * dx + ly * dy + lz * dz)
-        px, py, pz = x - scale * dx, y - scale * dy, z - scale * dz
+        ax = M[0, 0] * ux + M[0, 1] * uy + M[0, 2] * uz
+        ay = M[1, 0] * ux + M[1, 1] * uy + M[1, 2] * uz
+        az = M[2, 0] * ux + M[2, 1] * uy + M[2, 2] * uz
+        scale = 1.0 / math.sqrt(lx * ax + ly * ay + lz * az)
+        px, py, pz = x - scale * ax, y - scale * ay, z - scale * az
         depth, gx, gy, gz = distance_at(field, px, py, pz)
         if depth >= least:
             break
         least, lx, ly, lz = depth, gx, gy, gz
-        between, tx, ty, tz = True, px, py, pz
+        between, dx, dy, dz = True, px, py, pz
     if least >= 0.0:
         return
-    if between:
-        _add(front, tx, ty, tz, -least, TIP * skin.grain[i], lx, ly, lz)
+    if not shared:
+        _carry(front, dx, dy, dz, -least, lx, ly, lz)
+    elif between:
+        _add(front, dx, dy, dz, -least, TIP * skin.grain[i], lx, ly, lz)
     found.active[0] = 1.0
     _share_out(found)
 
@@ -410,7 +428,8 @@ def facet_pressure_point(front, j, share, flesh, px, py, pz, cx, cy, cz):
     """Return the centre of pressure on a region.
 
     Points on the body's surface have a mean height of a third of the depth under a pressure that
-    grows with it; flattened flesh lies in the plane of contact, at its whole depth.
+    grows with it; flattened flesh lies in the plane of contact, at its whole depth. A single point
+    carries the load as that of a zone does.
 
     Parameters
     ----------
@@ -418,7 +437,7 @@ def facet_pressure_point(front, j, share, flesh, px, py, pz, cx, cy, cz):
     j : int
         Row of the region.
     share : float
-        Not used.
+        Distance from a single point that carries the load, over that of the centre.
     flesh : float
         Penetration of the segment's flesh, m.
     px, py, pz : float
@@ -427,6 +446,8 @@ def facet_pressure_point(front, j, share, flesh, px, py, pz, cx, cy, cz):
         Ellipsoid centre in the car's frame, m.
     """
     found = front.found
+    if front.distributed[0] != 1.0:
+        return px + share * (cx - px), py + share * (cy - py), pz + share * (cz - pz)
     x, y, z = _to_car(front, found.mean[j, 0], found.mean[j, 1], found.mean[j, 2])
     nx, ny, nz = _vector_to_car(
         front, found.direction[j, 0], found.direction[j, 1], found.direction[j, 2]

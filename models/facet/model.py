@@ -13,10 +13,15 @@ from models.crash.scenario import Scenario
 from models.effects.registry import effects_of
 from models.multibody.model import MultibodyModel
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
-from models.pedestrian.skin import FINE, SUBDIVISIONS, build_skin
+from models.pedestrian.skin import FINE, SUBDIVISIONS, bare_skin, build_skin
 from models.vehicle.profile import dive_shift
 from models.vehicle.surface.generator import generate_surface, laws_of_regions
 from models.vehicle.surface.store import load_field
+
+CHILDREN = ("facets", "ellipsoids")
+"""Surfaces of the child."""
+LOADS = ("distributed", "deepest")
+"""Distributions of the load over the points of a segment."""
 
 _TABLE = data.load("facet.toml")
 
@@ -33,10 +38,16 @@ class FacetModel(MultibodyModel):
         Of the icosahedra that are the surface of the limbs: 2 gives 162 points a segment. Head and
         trunk have three at least, 642 points each.
 
+    child : str
+        ``facets``, or ``ellipsoids`` as in the multibody model.
+    load : str
+        ``distributed`` over the points inside the car, or carried by the ``deepest`` one, as in the
+        multibody model.
+
     Raises
     ------
     ValueError
-        If the number of subdivisions is not within 1 to 4.
+        If an option is none of these, or the number of subdivisions is not within 1 to 4.
     """
 
     name = "facet"
@@ -48,6 +59,8 @@ class FacetModel(MultibodyModel):
         self,
         vehicle: str = "family_car_1990s",
         subdivisions: int = SUBDIVISIONS,
+        child: str = "facets",
+        load: str = "distributed",
         tick: float = TICK,
         channel_class: float = LINEAR_CLASS,
         angular_class: float = ANGULAR_CLASS,
@@ -55,10 +68,17 @@ class FacetModel(MultibodyModel):
     ) -> None:
         if not 1 <= subdivisions <= 4:
             raise ValueError(f"subdivisions must lie within 1 and 4, given {subdivisions}")
+        for option, value, known in (("child", child, CHILDREN), ("load", load, LOADS)):
+            if value not in known:
+                raise ValueError(f"{option} must be one of {', '.join(known)}, given {value!r}")
+        if child == "ellipsoids" and load == "distributed":
+            raise ValueError("load: ellipsoids have no points that share it; choose 'deepest'")
         super().__init__(vehicle, tick, channel_class, angular_class, effects)
         self._subdivisions = [int(subdivisions)] * len(SEGMENTS)
         for row in (HEAD, *TRUNK):
             self._subdivisions[row] = max(int(subdivisions), FINE)
+        self._bare = child == "ellipsoids"
+        self._distributed = np.array([float(load == "distributed")])
         self.mesh = generate_surface(vehicle)
         self._field = load_field(self.mesh, laws_of_regions(self.vehicle, self.mesh))
         self._found = empty_findings(len(self.vehicle.zones))
@@ -70,6 +90,9 @@ class FacetModel(MultibodyModel):
             dive=np.array([math.cos(dive), math.sin(dive), *dive_shift(self.vehicle, dive)]),
             friction=scenario.zones.friction,
             ploughing=scenario.zones.ploughing,
-            skin=build_skin(scenario.body, self._subdivisions),
+            skin=bare_skin(len(SEGMENTS))
+            if self._bare
+            else build_skin(scenario.body, self._subdivisions),
+            distributed=self._distributed,
             found=self._found,
         )

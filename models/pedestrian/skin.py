@@ -46,6 +46,8 @@ class Skin(NamedTuple):
         First cluster of each segment.
     grain : (n,) array
         Mean area of a segment's points, m2.
+    smooth : (n,) array of bool
+        Whether the segment is the ellipsoid on which its points lie.
     """
 
     point: Array
@@ -56,6 +58,7 @@ class Skin(NamedTuple):
     first_point: Index
     first_cluster: Index
     grain: Array
+    smooth: NDArray[np.bool_]
 
 
 @functools.cache
@@ -155,7 +158,17 @@ def build_skin(body: Body, subdivisions: Sequence[int]) -> Skin:
         first_point=np.append(np.concatenate(starts), ends[-1]),
         first_cluster=np.concatenate([[0], np.cumsum(clusters)]),
         grain=np.array([part.area.mean() for part in parts]),
+        smooth=np.ones(len(parts), dtype=np.bool_),
     )
+
+
+def bare_skin(count: int) -> Skin:
+    """Return a skin without points: the segments are their ellipsoids."""
+    none, no_rows = np.zeros((0, 3)), np.zeros(count + 1, dtype=np.int64)
+    return Skin(
+        none, none, np.zeros(0), none, np.zeros(0), np.zeros(1, dtype=np.int64), no_rows,
+        np.ones(count), np.ones(count, dtype=np.bool_),
+    )  # fmt: skip
 
 
 class _Part(NamedTuple):

@@ -4,7 +4,20 @@ from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat
 
-from mcstudy.studyfile.schema import STRIP_TIMES, CommonStudy, ComparisonTable
+from mcstudy.studyfile.schema import (
+    STRIP_TIMES,
+    CommonStudy,
+    ComparisonTable,
+    ModelChoice,
+    StudyTable,
+)
+
+
+class Variant(StudyTable):
+    """``[[variants]]``: a model that takes the same inputs, and its label."""
+
+    label: Annotated[str, Field(min_length=1, max_length=80)]
+    model: ModelChoice
 
 
 class Reconstruction(CommonStudy):
@@ -12,4 +25,5 @@ class Reconstruction(CommonStudy):
 
     kind: Literal["reconstruction"]
     tables: list[ComparisonTable] = []
+    variants: list[Variant] = []
     strip_times: Annotated[list[FiniteFloat], Field(min_length=1)] = STRIP_TIMES

@@ -1,5 +1,6 @@
 """The reconstruction: one run, compared with published tables and drawn."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,6 +9,7 @@ import numpy as np
 from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.figures import crash, stiffness, style
+from mcstudy.figures.ranges import draw_ranges
 from mcstudy.report import Section, Table, render
 from mcstudy.studyfile.study_inputs import fixed_values
 from mcstudy.studyfile.study_outputs import check_outputs
@@ -16,6 +18,7 @@ from models.protocol import Model, Run, complete_status
 from studies.isomme_export import write_isomme
 from studies.published_tables import PublishedTable, as_table, compare_with_table
 from studies.reconstruction.schema import Reconstruction
+from studies.reconstruction.variants import VariantOutcome, variant_ranges, variant_table
 from studies.runs import load_study_model
 
 PRIMARY = 0.12
@@ -125,7 +128,12 @@ def draw(study: Reconstruction, run: Run) -> dict[str, Any]:
 
 
 def write_reconstruction(
-    study: Reconstruction, text: str, run: Run, tables: list[PublishedTable], folder: ResultsFolder
+    study: Reconstruction,
+    text: str,
+    run: Run,
+    tables: list[PublishedTable],
+    folder: ResultsFolder,
+    variants: Sequence[VariantOutcome] = (),
 ) -> None:
     """Write the results folder of a reconstruction: outputs, histories, figures, GIF, report.
 
@@ -141,6 +149,8 @@ def write_reconstruction(
         Comparison with published tables.
     folder : ResultsFolder
         Results folder of the study.
+    variants : sequence of VariantOutcome
+        From ``run_variants``.
     """
     model = load_study_model(study)
     with folder.open_for_writing():
@@ -153,20 +163,25 @@ def write_reconstruction(
                 "end_reason": run.end_reason,
                 "outputs": dict(run.outputs),
             }
-            | _work(run),
+            | _work(run)
+            | ({"variants": list(variants)} if variants else {}),
         )
         folder.add_histories(0, run.histories)
         write_isomme(
             run, model, folder.path / "iso_mme", name=study.name, title=study.title
         )  # fmt: skip
         figures = draw(study, run)
+        if variants:
+            figures["variants"] = draw_ranges(variant_ranges(study, variants, model))
         style.save(figures, folder.path / "figures")
         animations = {}
         if run.scene is not None:
             gif = folder.path / "figures" / "crash.gif"
             crash.write_animation(run.scene, gif)
             animations["The whole crash, from the side and from above."] = gif.read_bytes()
-        folder.write_text("report.html", _report(study, model, run, tables, figures, animations))
+        folder.write_text(
+            "report.html", _report(study, model, run, tables, figures, animations, variants)
+        )
 
 
 def _report(
@@ -176,11 +191,13 @@ def _report(
     tables: list[PublishedTable],
     figures: dict[str, Any],
     animations: dict[str, bytes],
+    variants: Sequence[VariantOutcome],
 ) -> str:
     captions = {name: view.caption for name, view in _VIEWS.items()} | {
         "kinematics": "The body from the side, in the car's frame.",
         "contact_force": "Contact force of each zone of the car.",
         "force_penetration": "Force of the hood on the headform against penetration.",
+        "variants": "The same inputs through models that differ in one thing.",
     }
     outputs = [
         [item.name, quantity(run.outputs[item.name], item.unit, 4), item.meaning]
@@ -203,11 +220,15 @@ def _report(
                 [[name.replace("_", " "), f"{value:,.1f}"] for name, value in work.items()],
             )
         )
-    strip = {captions[name]: figures[name] for name in ("kinematics",) if name in figures}
-    rest = {captions[name]: figure for name, figure in figures.items() if name != "kinematics"}
+    apart = {
+        name: {captions[name]: figures[name]} if name in figures else {}
+        for name in ("kinematics", "variants")
+    }
+    rest = {captions[name]: figure for name, figure in figures.items() if name not in apart}
     sections = [
         Section("Comparison with the published tables", (), [as_table(table) for table in tables]),
-        Section("Kinematics", (), (), strip, animations),
+        Section("One change at a time", *_variants_said(study, model, variants), apart["variants"]),
+        Section("Kinematics", (), (), apart["kinematics"], animations),
         Section("Histories", (), (), rest),
         Section("Numbers", (), numbers),
     ]
@@ -216,6 +237,19 @@ def _report(
         f"One run of the {model.name} model; it ended with {run.end_reason.replace('_', ' ')}.",
         [s for s in sections if s.tables or s.figures or s.animations],
     )
+
+
+def _variants_said(
+    study: Reconstruction, model: Model, variants: Sequence[VariantOutcome]
+) -> tuple[list[str], list[Table]]:
+    """Return what precedes the figure of the variants, and their table."""
+    if not variants:
+        return [], []
+    said = (
+        "Every variant takes the inputs of this case. A difference between neighbours is due to "
+        "the one thing that they do not share if it exceeds the scatter of the perturbed runs."
+    )
+    return [said], [variant_table(study, variants, model)]
 
 
 def _work(run: Run) -> dict[str, dict[str, float]]:

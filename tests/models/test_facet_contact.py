@@ -114,7 +114,8 @@ def touch(
     regions = int(field.region.max()) + 1
     front = FacetFront(
         field, np.array([1.0, 0.0, 0.0, 0.0]), np.full(regions, 0.5), np.zeros(regions),
-        build_skin(replace(body, semi_axes=semi), [3] * COUNT), empty_findings(regions),
+        build_skin(replace(body, semi_axes=semi), [3] * COUNT), np.ones(1),
+        empty_findings(regions),
     )  # fmt: skip
     ellipsoids = crash().scenario.ellipsoids._replace(
         square=semi**2, reach=semi.max(axis=1), offset=np.zeros((COUNT, 3))

@@ -155,15 +155,19 @@ class Mesh:
     Attributes
     ----------
     name : str
-    nodes : (f, k, 3) array
-        Positions in world axes at each frame, m.
+    nodes : (f, k, 3) or (k, 3) array
+        Positions in world axes at each frame, m; of a rigid body in its own frame.
     faces : (t, 3) or (t, 4) array
-        Nodes of each facet.
+        Nodes of each facet, counterclockwise seen from outside.
+    body : str
+        Rigid body whose frame it is: ``car``, or an ellipsoid, in whose place it is drawn; empty
+        for positions at each frame.
     """
 
     name: str
     nodes: Array
     faces: NDArray[np.int64]
+    body: str = ""
 
 
 @dataclass(frozen=True)
@@ -189,7 +193,7 @@ class Scene:
     plan : (k, 2) array
         x, y (m), outline of the car from above in its frame.
     meshes : sequence of Mesh
-        Surfaces of facets, drawn behind the ellipsoids.
+        Surfaces of facets.
     """
 
     time: Array

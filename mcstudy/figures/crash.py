@@ -10,6 +10,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
@@ -26,6 +27,8 @@ class MeshLike(Protocol):
     def nodes(self) -> Array: ...
     @property
     def faces(self) -> NDArray[np.int64]: ...
+    @property
+    def body(self) -> str: ...
 
 
 class SceneLike(Protocol):
@@ -51,8 +54,12 @@ class SceneLike(Protocol):
     def meshes(self) -> Sequence[MeshLike]: ...
 
 
+CAR = "car"
+"""Rigid body of a mesh that is the car."""
 MESH = "#E4E9EC"
-"""Colour of facets."""
+"""Colour of facets that belong to no segment."""
+LIGHT = np.array([0.4, -0.5, 0.77])
+"""Direction of the light on facets."""
 _CIRCLE = np.stack(
     [np.cos(np.linspace(0.0, 2.0 * np.pi, 41)), np.sin(np.linspace(0.0, 2.0 * np.pi, 41))]
 )
@@ -94,6 +101,8 @@ def _draw_body(
     order = np.argsort(scene.centre[frame, :, depth_axis])
     if plane == (0, 2):
         order = order[::-1]
+    meshed = {mesh.body for mesh in scene.meshes}
+    order = np.array([i for i in order if scene.names[int(i)] not in meshed], dtype=int)
     shapes = [_shadow(scene, frame, int(i), plane) - shift for i in order]
     colours = [_colour(scene.names[int(i)]) for i in order]
     axes.add_collection(
@@ -101,28 +110,66 @@ def _draw_body(
     )
 
 
+def _positions(scene: SceneLike, mesh: MeshLike, frame: int) -> Array:
+    """Return the nodes (k, 3) of a mesh in world axes."""
+    if not mesh.body:
+        return np.asarray(mesh.nodes[frame])
+    if mesh.body == CAR:
+        x, y, yaw = scene.car[frame]
+        c, s = math.cos(yaw), math.sin(yaw)
+        turned = mesh.nodes @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        return np.asarray(turned + np.array([x, y, 0.0]))
+    k = list(scene.names).index(mesh.body)
+    return np.asarray(
+        mesh.nodes @ _rotation(scene.orientation[frame, k]).T + scene.centre[frame, k]
+    )
+
+
 def _draw_meshes(
     axes: Axes, scene: SceneLike, frame: int, plane: tuple[int, int], shift: tuple[float, float]
 ) -> None:
-    """Draw the facets of all meshes, far ones first."""
+    """Draw the facets that face the viewer: of the car first, then of the body, far ones first."""
     depth_axis = ({0, 1, 2} - set(plane)).pop()
+    towards = -1.0 if plane == (0, 2) else 1.0
+    car: list[tuple[Array, Array]] = []
+    body: list[tuple[Array, Array]] = []
     for mesh in scene.meshes:
-        corners = mesh.nodes[frame][mesh.faces]
-        order = np.argsort(corners[:, :, depth_axis].mean(axis=1))
-        if plane == (0, 2):
-            order = order[::-1]
-        shapes = corners[order][:, :, list(plane)] - np.asarray(shift)
+        corners = _positions(scene, mesh, frame)[mesh.faces]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+        seen = towards * normal[:, depth_axis] > 0.0
+        owner = mesh.body if mesh.body != CAR else ""
+        base = np.array(to_rgb(_colour(owner) if owner else MESH))
+        shade = 0.72 + 0.28 * np.clip(normal[seen] @ LIGHT, 0.0, 1.0)
+        (body if owner else car).append((corners[seen], shade[:, None] * base))
+    for parts in (car, body):
+        if not parts:
+            continue
+        corners = np.concatenate([part[0] for part in parts])
+        colours = np.concatenate([part[1] for part in parts])
+        order = np.argsort(towards * corners[:, :, depth_axis].mean(axis=1))
         axes.add_collection(
-            PolyCollection(shapes, facecolors=MESH, edgecolors=style.GREY, linewidths=0.2)
+            PolyCollection(
+                corners[order][:, :, list(plane)] - np.asarray(shift),
+                facecolors=colours[order],
+                edgecolors="none",
+                antialiaseds=False,
+                rasterized=True,
+            ),
+            autolim=False,
         )
 
 
 def _draw_car_side(axes: Axes, scene: SceneLike, x: float) -> None:
+    if any(mesh.body == CAR for mesh in scene.meshes):
+        return
     for line in scene.outline:
         axes.plot(line[:, 0] + x, line[:, 1], color="#333333", linewidth=1.2)
 
 
 def _draw_car_plan(axes: Axes, scene: SceneLike, frame: int) -> None:
+    if any(mesh.body == CAR for mesh in scene.meshes):
+        return
     x, y, yaw = scene.car[frame]
     c, s = math.cos(yaw), math.sin(yaw)
     plan = scene.plan @ np.array([[c, s], [-s, c]]) + (x, y)
@@ -207,7 +254,8 @@ def write_animation(scene: SceneLike, path: Path, *, frames: int = 120) -> None:
     frames : int
         Largest number of frames.
     """
-    chosen = _animation_frames(scene.time, frames)
+    # Thousands of facets take a third of a second a frame.
+    chosen = _animation_frames(scene.time, frames // 2 if scene.meshes else frames)
     low = scene.centre[:, :, 0].min() - 0.8
     high = max(scene.centre[:, :, 0].max(), scene.car[:, 0].max()) + 0.6
     right = min(float(scene.centre[:, :, 1].min()), -1.0) - 0.4

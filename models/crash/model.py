@@ -2,7 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from models.crash.record import END_REASONS, Column, Frame, Summary
 from models.declaration import run_rows
 from models.effects.chain import build_chain
 from models.pedestrian.anthropometry import SEGMENTS, is_possible
-from models.protocol import OK, Batch, Channel, Input, Output, Run, complete_inputs
+from models.protocol import OK, Batch, Channel, Input, Mesh, Output, Run, complete_inputs
 from models.vehicle.profile import Vehicle, load_vehicle
 
 Array = NDArray[np.float64]
@@ -146,6 +146,10 @@ class CrashModel(ABC):
         """
         return run_rows(self, rows, self._row, started)
 
+    def _meshes(self, raw: outcome.Raw) -> Sequence[Mesh]:
+        """Return the surfaces of facets for pictures, in the frames of their bodies."""
+        return ()
+
     @abstractmethod
     def _step(self, values: dict[str, float]) -> outcome.Raw | None:
         """Return the raw results of the step loop, or None if the body never touches the car."""
@@ -173,7 +177,12 @@ class CrashModel(ABC):
         reason = END_REASONS[int(raw.summary[Summary.END_REASON])]
         histories = outcome.histories(raw, signals, channels)
         return Run(
-            values, status, reason, measured, histories, outcome.scene(raw) if scene else None
+            values,
+            status,
+            reason,
+            measured,
+            histories,
+            outcome.scene(raw, self._meshes(raw)) if scene else None,
         )
 
     def _row(self, values: dict[str, float]) -> tuple[str, dict[str, float]]:

@@ -2,7 +2,7 @@
 
 import functools
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +26,7 @@ from models.criteria.units import STANDARD_GRAVITY
 from models.effects.chain import EffectChain
 from models.effects.reading import Reading, record_reading
 from models.pedestrian.anthropometry import HEAD, SEGMENTS
-from models.protocol import History, Scene, chosen_histories, history_of
+from models.protocol import History, Mesh, Scene, chosen_histories, history_of
 from models.vehicle.motion import stopping_distance
 from models.vehicle.profile import (
     hood_edge_distance,
@@ -344,8 +344,15 @@ def histories(
     return found
 
 
-def scene(raw: Raw) -> Scene:
-    """Return the poses of the segments and the car's outlines."""
+def scene(raw: Raw, meshes: Sequence[Mesh] = ()) -> Scene:
+    """Return the poses of the segments, the car's outlines and surfaces of facets.
+
+    Parameters
+    ----------
+    raw : Raw
+    meshes : sequence of Mesh
+        Surfaces of rigid bodies, in their own frames.
+    """
     frames, n = raw.frames, len(SEGMENTS)
     pose = frames[:, Frame.POSES :].reshape(-1, n, 7)
     zones = raw.scenario.zones
@@ -377,4 +384,5 @@ def scene(raw: Raw) -> Scene:
         car=frames[:, Frame.CAR : Frame.POSES].copy(),
         outline=outline,
         plan=plan,
+        meshes=meshes,
     )

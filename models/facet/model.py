@@ -4,19 +4,23 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models import data
 from models.crash.facet_front import FacetFront, empty_findings
 from models.crash.model import TICK
-from models.crash.outcome import ANGULAR_CLASS, LINEAR_CLASS
+from models.crash.outcome import ANGULAR_CLASS, LINEAR_CLASS, Raw
 from models.crash.scenario import Scenario
 from models.effects.registry import effects_of
 from models.multibody.model import MultibodyModel
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
-from models.pedestrian.skin import FINE, SUBDIVISIONS, bare_skin, build_skin
+from models.pedestrian.skin import FINE, SUBDIVISIONS, bare_skin, build_skin, segment_mesh
+from models.protocol import Mesh
 from models.vehicle.profile import dive_shift
 from models.vehicle.surface.generator import generate_surface, laws_of_regions
 from models.vehicle.surface.store import load_field
+
+Array = NDArray[np.float64]
 
 CHILDREN = ("facets", "ellipsoids")
 """Surfaces of the child."""
@@ -84,10 +88,9 @@ class FacetModel(MultibodyModel):
         self._found = empty_findings(len(self.vehicle.zones))
 
     def _front(self, scenario: Scenario) -> FacetFront:
-        dive = scenario.dive_angle
         return FacetFront(
             field=self._field,
-            dive=np.array([math.cos(dive), math.sin(dive), *dive_shift(self.vehicle, dive)]),
+            dive=self._dive(scenario),
             friction=scenario.zones.friction,
             ploughing=scenario.zones.ploughing,
             skin=bare_skin(len(SEGMENTS))
@@ -96,3 +99,21 @@ class FacetModel(MultibodyModel):
             distributed=self._distributed,
             found=self._found,
         )
+
+    def _meshes(self, raw: Raw) -> list[Mesh]:
+        """Return the diving car and, if it has facets, the child."""
+        c, s, dx, dz = self._dive(raw.scenario)
+        x, y, z = self.mesh.nodes.T
+        car = np.stack([c * x + s * z + dx, y, -s * x + c * z + dz], axis=1)
+        found = [Mesh("car", car, self.mesh.facets, "car")]
+        if not self._bare:
+            found += [
+                Mesh(name, *segment_mesh(raw.scenario.body, k), name)
+                for k, name in enumerate(SEGMENTS)
+            ]
+        return found
+
+    def _dive(self, scenario: Scenario) -> Array:
+        """Return cosine and sine of the dive angle, and the shift of the diving car in m."""
+        dive = scenario.dive_angle
+        return np.array([math.cos(dive), math.sin(dive), *dive_shift(self.vehicle, dive)])

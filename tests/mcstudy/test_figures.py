@@ -295,6 +295,7 @@ class Mesh:
 
     nodes: Array
     faces: NDArray[np.int64]
+    body: str = ""
 
 
 @dataclass(frozen=True)
@@ -350,6 +351,21 @@ def test_facets_are_drawn_behind_the_body_where_they_are(scene: Scene) -> None:
     facets, body = crash.draw_strip(meshed, [0.5]).axes[0].collections
     assert_allclose(facets.get_paths()[0].vertices[:3], triangle[:, [0, 2]], atol=1e-12)
     assert facets.get_zorder() <= body.get_zorder() and len(body.get_paths()) == 2
+
+
+def test_facets_of_a_rigid_body_move_with_it_and_stand_for_its_ellipsoid(scene: Scene) -> None:
+    triangle = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.4], [-0.3, 0.0, 0.4]])
+    faces = np.array([[0, 1, 2], [2, 1, 0]])
+    meshed = replace(scene, meshes=(Mesh(triangle, faces, "car"), Mesh(triangle, faces, "head")))
+    car, head, body = crash.draw_strip(meshed, [0.5]).axes[0].collections
+    # One of two opposite facets faces the viewer.
+    assert (len(car.get_paths()), len(head.get_paths()), len(body.get_paths())) == (1, 1, 1)
+    turned = np.cos(0.05) * triangle[:, 0]
+    places = [(car, np.stack([turned, triangle[:, 2]], axis=1)),
+              (head, triangle[:, [0, 2]] + [0.1 + 2.0 * 0.5, 1.1])]  # fmt: skip
+    for drawn, expected in places:
+        found = np.asarray(drawn.get_paths()[0].vertices[:3])
+        assert_allclose(np.sort(found, axis=0), np.sort(expected, axis=0), atol=1e-12)
 
 
 def test_the_animation_is_a_gif_of_several_pictures(scene: Scene, tmp_path: Path) -> None:

@@ -340,6 +340,33 @@ def effects(
     print_table("", head, cells)
 
 
+@app.command()
+def vehicle(
+    mesh: Annotated[
+        str, typer.Argument(help="STL, PLY, OBJ or LS-DYNA file of a car, or a vehicle's name.")
+    ],
+    out: Out = None,
+    unit: Annotated[
+        str, typer.Option(help="Unit of the file's coordinates: m, cm, mm, in, ft.")
+    ] = "m",
+    lift: Annotated[float, typer.Option(help="Height to add, in m.")] = 0.0,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Show what is understood of a car's mesh: regions, wrap-around lines, open edges."""
+    from studies.vehicle_surface import draw_summary, understand_surface
+
+    summary = understand_surface(mesh, unit, lift)
+    picture = draw_summary(summary, out or Path("results") / f"vehicle_{Path(mesh).stem}")
+    if as_json:
+        _print_json(summary.numbers() | {"picture": str(picture)})
+    elif not quiet:
+        table = summary.table()
+        print_table(table.caption, table.head, table.rows)
+        print_lines(summary.notes)
+        print_path("picture", picture)
+
+
 def _print_analysis(
     analysis: Any, summary: Iterable[Any], path: Path, *, quiet: bool, as_json: bool
 ) -> None:

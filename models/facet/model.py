@@ -88,6 +88,10 @@ class FacetModel(MultibodyModel):
         self._found = empty_findings(len(self.vehicle.zones))
 
     def _front(self, scenario: Scenario) -> FacetFront:
+        return self.front_of(scenario)
+
+    def front_of(self, scenario: Scenario) -> FacetFront:
+        """Return the front of facets of a scenario."""
         return FacetFront(
             field=self._field,
             dive=self._dive(scenario),

@@ -8,6 +8,7 @@ from models.registry import load_model
 from studies.validation import (
     body_parts,
     dummy_head,
+    edge_passage,
     ground_impact,
     head_impact,
     headform_impacts,
@@ -24,6 +25,7 @@ PARTS: dict[str, Callable[[int], Part]] = {
     "head-impact": head_impact.validate,
     "body-parts": body_parts.validate,
     "standing-child": standing_child.validate,
+    "edge": edge_passage.validate,
     "numerics": numerics.validate,
 }
 MEASURED: dict[str, Callable[[int, Path], Part]] = {

@@ -19,7 +19,6 @@ from models.criteria import (
     filter_cfc,
     impact_angle,
 )
-from models.criteria.filters import settling_time
 from models.criteria.hic import cumulative_area, maximise_window
 from models.criteria.sampling import resultant, sample_record
 from models.criteria.units import STANDARD_GRAVITY
@@ -47,8 +46,6 @@ ANGULAR_CLASS = 180.0
 it to the user and the case does not state it)."""
 HIGHEST_CLASS = 2400.0
 """Channel frequency class whose corner lies just below half the sampling rate."""
-FORGOTTEN = 1e-40
-"""Share of a filter's response that no digit of a double precision signal holds."""
 SHORTEST_PHASE = 40
 """Samples below which a phase is too short to filter."""
 
@@ -170,18 +167,7 @@ class Signals:
     @functools.cached_property
     def angular(self) -> Array:
         """Angular velocity in rad/s and acceleration in rad/s2 (n, 6), own axes."""
-        return self._angular(self.head_time)
-
-    @functools.cached_property
-    def primary_angular(self) -> Array:
-        """The same of the primary phase; later samples that do not change it are left out."""
-        frequency_class = self._raw.classes.angular
-        beyond = settling_time(frequency_class, FORGOTTEN) if frequency_class else 0.0
-        end = self.split + int(beyond * SAMPLING_RATE) + 1
-        return self._angular(self.head_time[:end])[: self.split]
-
-    def _angular(self, time: Array) -> Array:
-        signal = self.sampled(Column.SPIN, 6, time)
+        signal = self.sampled(Column.SPIN, 6, self.head_time)
         frequency_class = self._raw.classes.angular
         if not frequency_class:
             return signal
@@ -231,9 +217,9 @@ def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
         "clip_3ms": lambda: clip("cumulative"),
         "clip_3ms_consecutive": lambda: clip("consecutive"),
         "peak_head_acceleration": lambda: float(signals.acceleration[car].max()),
-        "head_angular_velocity": lambda: float(resultant(signals.primary_angular[:, :3]).max()),
-        "head_angular_acceleration": lambda: float(resultant(signals.primary_angular[:, 3:]).max()),
-        "bric": lambda: brain_injury_criterion(signals.primary_angular[:, :3]),
+        "head_angular_velocity": lambda: float(resultant(signals.angular[car, :3]).max()),
+        "head_angular_acceleration": lambda: float(resultant(signals.angular[car, 3:]).max()),
+        "bric": lambda: brain_injury_criterion(signals.angular[car, :3]),
         "throw_distance": throw,
         "launch_speed": lambda: float(
             (np.diff(record[:, Column.CENTRE]) / np.diff(record[:, Column.TIME])).max()

@@ -22,21 +22,14 @@ SETTLED = 1e-3
 """Remaining share of a step response after the settling time."""
 
 
-def settling_time(frequency_class: float, left: float = SETTLED) -> float:
+def settling_time(frequency_class: float) -> float:
     """Return the time (s) by which a filter's response extends before and after an event.
 
     The poles of a second-order Butterworth filter decay at its corner frequency over the square
     root of two.
-
-    Parameters
-    ----------
-    frequency_class : float
-        Channel frequency class.
-    left : float
-        Share of the response that is left after that time.
     """
     decay = 2.0 * math.pi * CUTOFF_FACTOR * frequency_class / math.sqrt(2.0)
-    return math.log(1.0 / left) / decay
+    return math.log(1.0 / SETTLED) / decay
 
 
 @functools.cache

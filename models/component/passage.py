@@ -10,7 +10,7 @@ from models.crash.car_contact import apply_car_contacts
 from models.crash.surfaces import CHANNELS, empty_contacts, update_surfaces
 from models.multibody.setup import Crash
 from models.multibody.tree import empty_loads, empty_motion
-from models.rotation import axis_rotation
+from models.rotation import axis_rotation, matrix_of
 
 Array = NDArray[np.float64]
 
@@ -49,11 +49,9 @@ def force_along(crash: Crash, front: Any, segment: int, places: Array) -> Array:
     ellipsoids = crash.scenario.ellipsoids
     zones, pairs = len(crash.scenario.vehicle.zones), len(ellipsoids.pairs)
     motion, loads = empty_motion(count), empty_loads(count)
-    motion.orientation[:] = [1.0, 0.0, 0.0, 0.0]
     motion.rotation[:] = np.eye(3)
     # A quarter turn about x lays the long axis z across the car.
-    motion.orientation[segment] = axis_rotation(0, 0.5 * np.pi)
-    turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    turn = np.array(matrix_of(axis_rotation(0, 0.5 * np.pi)))
     motion.rotation[segment] = turn
     motion.centre[:] = [FAR, 0.0, FAR]
     offset = turn @ ellipsoids.offset[segment]

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from numba.extending import overload
 
 from models.compilation import MERGED_FLAGS
-from models.crash import facet_front, zone_front
+from models.crash import facet_front, facet_survey, zone_front
 from models.crash.facet_front import FacetFront
 from models.vehicle.zones import Zones
 
@@ -56,7 +56,7 @@ FRONTS: dict[type, Answers] = {
     ),
     FacetFront: Answers(
         patch_count=facet_front.facet_count,
-        survey=facet_front.facet_survey,
+        survey=facet_survey.facet_survey,
         may_touch=facet_front.facet_may_touch,
         is_near=facet_front.facet_is_near,
         separation_of=facet_front.facet_separation,

@@ -4,10 +4,10 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from models import data
-from models.crash.facet_front import FacetFront, empty_findings
+from models.crash.facet_front import FacetFront
+from models.crash.facet_survey import empty_findings
 from models.crash.model import TICK
 from models.crash.outcome import ANGULAR_CLASS, LINEAR_CLASS, Raw
 from models.crash.scenario import Scenario
@@ -16,11 +16,9 @@ from models.multibody.model import MultibodyModel
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
 from models.pedestrian.skin import FINE, SUBDIVISIONS, bare_skin, build_skin, segment_mesh
 from models.protocol import Mesh
-from models.vehicle.profile import dive_shift
+from models.vehicle.profile import dive_shift, diving_points
 from models.vehicle.surface.generator import generate_surface, laws_of_regions
 from models.vehicle.surface.store import load_field
-
-Array = NDArray[np.float64]
 
 CHILDREN = ("facets", "ellipsoids")
 """Surfaces of the child."""
@@ -41,7 +39,6 @@ class FacetModel(MultibodyModel):
     subdivisions : int
         Of the icosahedra that are the surface of the limbs: 2 gives 162 points a segment. Head and
         trunk have three at least, 642 points each.
-
     child : str
         ``facets``, or ``ellipsoids`` as in the multibody model.
     load : str
@@ -87,14 +84,12 @@ class FacetModel(MultibodyModel):
         self._field = load_field(self.mesh, laws_of_regions(self.vehicle, self.mesh))
         self._found = empty_findings(len(self.vehicle.zones))
 
-    def _front(self, scenario: Scenario) -> FacetFront:
-        return self.front_of(scenario)
-
     def front_of(self, scenario: Scenario) -> FacetFront:
         """Return the front of facets of a scenario."""
+        dive = scenario.dive_angle
         return FacetFront(
             field=self._field,
-            dive=self._dive(scenario),
+            dive=np.array([math.cos(dive), math.sin(dive), *dive_shift(self.vehicle, dive)]),
             friction=scenario.zones.friction,
             ploughing=scenario.zones.ploughing,
             skin=bare_skin(len(SEGMENTS))
@@ -106,9 +101,8 @@ class FacetModel(MultibodyModel):
 
     def _meshes(self, raw: Raw) -> list[Mesh]:
         """Return the diving car and, if it has facets, the child."""
-        c, s, dx, dz = self._dive(raw.scenario)
-        x, y, z = self.mesh.nodes.T
-        car = np.stack([c * x + s * z + dx, y, -s * x + c * z + dz], axis=1)
+        car = self.mesh.nodes.copy()
+        car[:, [0, 2]] = diving_points(self.vehicle, raw.scenario.dive_angle, car[:, [0, 2]])
         found = [Mesh("car", car, self.mesh.facets, "car")]
         if not self._bare:
             found += [
@@ -116,8 +110,3 @@ class FacetModel(MultibodyModel):
                 for k, name in enumerate(SEGMENTS)
             ]
         return found
-
-    def _dive(self, scenario: Scenario) -> Array:
-        """Return cosine and sine of the dive angle, and the shift of the diving car in m."""
-        dive = scenario.dive_angle
-        return np.array([math.cos(dive), math.sin(dive), *dive_shift(self.vehicle, dive)])

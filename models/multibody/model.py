@@ -39,10 +39,10 @@ class MultibodyModel(CrashModel):
     cost = float(_TABLE["cost"])
 
     def _step(self, values: dict[str, float]) -> outcome.Raw | None:
-        crash = build_crash(values, self.vehicle, self._chain, self._front)
+        crash = build_crash(values, self.vehicle, self._chain, self.front_of)
         return None if crash is None else self.follow(crash, values)
 
-    def _front(self, scenario: Scenario) -> Any:
+    def front_of(self, scenario: Scenario) -> Any:
         """Return the geometry of the car's front, one of the types of ``models.crash.front``."""
         return scenario.zones
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from models import data
 from models.contact.corridor import Corridor, read_corridor
+from models.vehicle.tape import tape_over
 from models.vehicle.zones import MAXIMUM_DEPTH, PANEL, ROLL, Zones
 
 Array = NDArray[np.float64]
@@ -250,6 +251,25 @@ def _widest(zones: Sequence[Zone], zone: Zone) -> float:
     return max([zone.half_width, *(z.half_width for z in zones if _beside(zone, z))])
 
 
+def diving_points(vehicle: Vehicle, dive_angle: float, points: Array) -> Array:
+    """Return points of the static car in the frame of the diving car.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    dive_angle : float
+        Nose down, rad.
+    points : (k, 2) array
+        x and z in the frame of the static car, m.
+
+    Returns
+    -------
+    (k, 2) array
+        x and z, m.
+    """
+    return np.asarray(_turn(points, dive_angle) + dive_shift(vehicle, dive_angle))
+
+
 def static_point(vehicle: Vehicle, dive_angle: float, point: Array) -> Array:
     """Return a point of the diving car in the frame of the static car.
 
@@ -289,22 +309,7 @@ def _tape(vehicle_name: str, zone: int) -> Array:
             points.append(np.array([entry.origin, entry.origin + entry.length * entry.direction]))
     if vehicle.zones[zone].kind != ROLL:
         points[-1] = points[-1][:1]
-    cloud = np.concatenate(points)
-    hull = [np.array([cloud[:, 0].max(), 0.0])]
-    # Gift wrapping from the road upwards and rearwards.
-    heading = math.pi / 2.0
-    last = cloud[np.argmin(cloud[:, 0])]
-    while not np.array_equal(hull[-1], last):
-        step = cloud - hull[-1]
-        size = np.hypot(step[:, 0], step[:, 1])
-        angle = np.arctan2(step[:, 1], step[:, 0]) % (2.0 * math.pi)
-        angle = np.where((size > 1e-9) & (angle >= heading - 1e-9), angle, np.inf)
-        nearest = np.lexsort((-size, np.round(angle, 9)))[0]
-        if not np.isfinite(angle[nearest]):
-            break
-        heading = float(angle[nearest])
-        hull.append(cloud[nearest])
-    return np.array(hull)
+    return tape_over(np.concatenate(points))
 
 
 def wrap_around_distance(vehicle_name: str, zone: int, point: Array) -> float:

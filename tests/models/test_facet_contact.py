@@ -14,7 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from models.crash.facet_front import FacetFront, empty_findings
+from models.crash.facet_front import FacetFront
+from models.crash.facet_survey import empty_findings
 from models.crash.front import patch_count, pressure_point, separation_of, survey
 from models.crash.surfaces import empty_contacts
 from models.multibody.model import MultibodyModel

@@ -12,7 +12,8 @@ from models.vehicle.profile import load_vehicle, wrap_around_distance
 from models.vehicle.surface.generator import generate_surface
 from models.vehicle.surface.mesh import SurfaceMesh
 from models.vehicle.surface.reader import UNITS, read_surface
-from models.vehicle.surface.wrap import section, tape_over, wrap_line
+from models.vehicle.surface.wrap import section, wrap_line
+from models.vehicle.tape import tape_over
 
 NAME = "family_car_1990s"
 

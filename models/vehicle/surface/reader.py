@@ -4,8 +4,10 @@ STL, PLY and OBJ are read by trimesh, LS-DYNA keyword shells by lsdyna-mesh-read
 states its unit.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from models.vehicle.surface.mesh import SurfaceMesh
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Content = TypeVar("Content")
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 """Units of a mesh, in m."""
@@ -103,20 +106,21 @@ def _place(point: Array) -> str:
     return f"({x:.3f}, {y:.3f}, {z:.3f}) m"
 
 
-def _unreadable(path: Path, error: Exception) -> ValueError:
-    said = " ".join(str(error).split())[:120] or type(error).__name__
-    return ValueError(f"{path}: cannot be read ({said})")
+def _parsed(path: Path, parse: Callable[[], Content]) -> Content:
+    """Return what a library reads; whatever it raises over a foreign file becomes one line."""
+    try:
+        return parse()
+    except Exception as error:
+        said = " ".join(str(error).split())[:120] or type(error).__name__
+        raise ValueError(f"{path}: cannot be read ({said})") from None
 
 
 def _read_mesh_file(path: Path) -> SurfaceMesh:
     """Return an STL, PLY or OBJ file in its own unit."""
     import trimesh
 
-    try:
-        scene = trimesh.load_scene(path, process=False)
-        parts = {str(k): v for k, v in scene.geometry.items() if isinstance(v, trimesh.Trimesh)}
-    except Exception as error:  # whatever a parser of foreign files raises
-        raise _unreadable(path, error) from None
+    scene = _parsed(path, lambda: trimesh.load_scene(path, process=False))
+    parts = {str(k): v for k, v in scene.geometry.items() if isinstance(v, trimesh.Trimesh)}
     nodes: list[Array] = []
     facets: list[Index] = []
     region: list[Index] = []
@@ -137,12 +141,9 @@ def _read_keyword(path: Path) -> SurfaceMesh:
     """Return the shells of an LS-DYNA keyword file in its own unit, a region a part."""
     import lsdyna_mesh_reader
 
-    try:
-        deck = lsdyna_mesh_reader.Deck(str(path))
-        sections = [(s.nid, s.coordinates) for s in deck.node_sections]
-        shells = [(s.pid, s.node_ids, s.node_id_offsets) for s in deck.element_shell_sections]
-    except Exception as error:  # whatever a parser of foreign files raises
-        raise _unreadable(path, error) from None
+    deck = _parsed(path, lambda: lsdyna_mesh_reader.Deck(str(path)))
+    sections = [(s.nid, s.coordinates) for s in deck.node_sections]
+    shells = [(s.pid, s.node_ids, s.node_id_offsets) for s in deck.element_shell_sections]
     if not sections or not shells:
         raise ValueError(f"{path}: has no *NODE or no *ELEMENT_SHELL")
     number = np.concatenate([np.asarray(nid) for nid, _ in sections])

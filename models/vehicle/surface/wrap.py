@@ -1,11 +1,10 @@
 """Wrap-around lines on a mesh: a taut tape from the road over the front of the car."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from models.vehicle.surface.mesh import SurfaceMesh
+from models.vehicle.tape import tape_over
 
 Array = NDArray[np.float64]
 
@@ -22,30 +21,6 @@ def section(mesh: SurfaceMesh, y: float) -> Array:
     share = before[cut] / (before[cut] - after[cut])
     points = start[cut] + share[:, None] * (end[cut] - start[cut])
     return np.asarray(points[:, [0, 2]])
-
-
-def tape_over(points: Array) -> Array:
-    """Return the path (k, 2) of a taut tape from the road under the foremost point to the rearmost.
-
-    Parameters
-    ----------
-    points : (n, 2) array
-        x and z of a section, m.
-    """
-    path = [np.array([points[:, 0].max(), 0.0])]
-    heading, last = 0.5 * math.pi, points[:, 0].min()
-    while path[-1][0] > last + 1e-9:
-        step = points - path[-1]
-        size = np.hypot(step[:, 0], step[:, 1])
-        angle = np.arctan2(step[:, 1], step[:, 0]) % (2.0 * math.pi)
-        ahead = (size > 1e-9) & (angle >= heading - 1e-9) & (angle < heading + math.pi)
-        if not ahead.any():
-            break
-        turned = np.where(ahead, angle, np.inf)
-        nearest = np.lexsort((-size, np.round(turned, 9)))[0]
-        heading = float(angle[nearest])
-        path.append(points[nearest])
-    return np.array(path)
 
 
 def wrap_distance(points: Array, end: Array) -> float:

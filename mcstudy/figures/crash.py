@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from mcstudy.figures import style
+from mcstudy.figures.facets import facet_collection, shaded, unit_normals
 
 Array = NDArray[np.float64]
 
@@ -131,44 +132,38 @@ def _draw_meshes(
     """Draw the facets that face the viewer: of the car first, then of the body, far ones first."""
     depth_axis = ({0, 1, 2} - set(plane)).pop()
     towards = -1.0 if plane == (0, 2) else 1.0
+    away = np.zeros(3)
+    away[list(plane)] = shift
     car: list[tuple[Array, Array]] = []
     body: list[tuple[Array, Array]] = []
     for mesh in scene.meshes:
         corners = _positions(scene, mesh, frame)[mesh.faces]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
+        normal = unit_normals(corners)
         seen = towards * normal[:, depth_axis] > 0.0
         owner = mesh.body if mesh.body != CAR else ""
         base = np.array(to_rgb(_colour(owner) if owner else MESH))
-        shade = 0.72 + 0.28 * np.clip(normal[seen] @ LIGHT, 0.0, 1.0)
-        (body if owner else car).append((corners[seen], shade[:, None] * base))
+        colours = shaded(base, normal[seen], LIGHT, 0.72)
+        (body if owner else car).append((corners[seen] - away, colours))
     for parts in (car, body):
-        if not parts:
-            continue
-        corners = np.concatenate([part[0] for part in parts])
-        colours = np.concatenate([part[1] for part in parts])
-        order = np.argsort(towards * corners[:, :, depth_axis].mean(axis=1))
-        axes.add_collection(
-            PolyCollection(
-                corners[order][:, :, list(plane)] - np.asarray(shift),
-                facecolors=colours[order],
-                edgecolors="none",
-                antialiaseds=False,
-                rasterized=True,
-            ),
-            autolim=False,
-        )
+        if parts:
+            corners, colours = (np.concatenate(part) for part in zip(*parts, strict=True))
+            axes.add_collection(facet_collection(corners, colours, plane, towards), autolim=False)
+
+
+def _has_car(scene: SceneLike) -> bool:
+    """Return whether a mesh stands for the car's outlines."""
+    return any(mesh.body == CAR for mesh in scene.meshes)
 
 
 def _draw_car_side(axes: Axes, scene: SceneLike, x: float) -> None:
-    if any(mesh.body == CAR for mesh in scene.meshes):
+    if _has_car(scene):
         return
     for line in scene.outline:
         axes.plot(line[:, 0] + x, line[:, 1], color="#333333", linewidth=1.2)
 
 
 def _draw_car_plan(axes: Axes, scene: SceneLike, frame: int) -> None:
-    if any(mesh.body == CAR for mesh in scene.meshes):
+    if _has_car(scene):
         return
     x, y, yaw = scene.car[frame]
     c, s = math.cos(yaw), math.sin(yaw)

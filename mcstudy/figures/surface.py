@@ -5,19 +5,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from mcstudy.figures import style
+from mcstudy.figures.facets import facet_collection, shaded, unit_normals
 
 Array = NDArray[np.float64]
 
 LIGHT = np.array([0.45, 0.35, 0.82])
 """Direction of the light."""
-_PLANES = {"from the left": ((0, 2), 1.0), "from above": ((0, 1), 1.0), "from ahead": ((1, 2), 1.0)}
+_PLANES = {"from the left": (0, 2), "from above": (0, 1), "from ahead": (1, 2)}
 
 
 @dataclass(frozen=True)
@@ -79,23 +80,10 @@ def _draw_view(
     open_edges: Array | None,
     title: str,
 ) -> None:
-    plane, towards = _PLANES[title]
-    depth = ({0, 1, 2} - set(plane)).pop()
-    corners = facets.corners
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    order = np.argsort(towards * corners[:, :, depth].mean(axis=1))
+    plane = _PLANES[title]
     base = np.array([_colour(k) for k in range(len(facets.names))])[facets.region]
-    shade = 0.55 + 0.45 * np.clip(normal @ LIGHT, 0.0, 1.0)
-    axes.add_collection(
-        PolyCollection(
-            list(corners[order][:, :, list(plane)]),
-            facecolors=np.clip(shade[:, None] * base, 0.0, 1.0)[order],
-            edgecolors="none",
-            antialiaseds=False,
-            rasterized=True,
-        )
-    )
+    colours = shaded(base, unit_normals(facets.corners), LIGHT, 0.55)
+    axes.add_collection(facet_collection(facets.corners, colours, plane))
     for label, points in lines.items():
         axes.plot(points[:, plane[0]], points[:, plane[1]], color="black", linewidth=1.0)
         if title == "from above":

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, FiniteFloat
+from pydantic import Field, FiniteFloat, field_validator
 
 from mcstudy.studyfile.schema import (
     STRIP_TIMES,
@@ -27,3 +27,12 @@ class Reconstruction(CommonStudy):
     tables: list[ComparisonTable] = []
     variants: list[Variant] = []
     strip_times: Annotated[list[FiniteFloat], Field(min_length=1)] = STRIP_TIMES
+
+    @field_validator("variants")
+    @classmethod
+    def _labels_differ(cls, variants: list[Variant]) -> list[Variant]:
+        labels = [variant.label for variant in variants]
+        for label in labels:
+            if labels.count(label) > 1:
+                raise ValueError(f"the label {label!r} stands twice")
+        return variants

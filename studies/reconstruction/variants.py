@@ -21,8 +21,8 @@ from mcstudy.studyfile.study_inputs import fixed_values
 from mcstudy.studyfile.study_outputs import check_outputs
 from mcstudy.text import number
 from models.protocol import Model, complete_status
-from models.registry import load_model
 from studies.reconstruction.schema import Reconstruction
+from studies.runs import evaluator_of, load_study_model
 
 PERTURBED = 24
 """Runs of a variant with perturbed inputs."""
@@ -31,22 +31,12 @@ SIZE = 0.003
 
 
 @dataclass(frozen=True)
-class VariantSpread:
-    """An output of a variant: nominal run, and the smallest, median and largest perturbed one."""
-
-    nominal: float
-    low: float
-    median: float
-    high: float
-
-
-@dataclass(frozen=True)
 class VariantOutcome:
     """Outputs of a variant by name, and the number of its perturbed runs that are complete."""
 
     label: str
     runs: int
-    outputs: Mapping[str, VariantSpread]
+    outputs: Mapping[str, Range]
 
 
 def run_variants(study: Reconstruction, *, quiet: bool = True) -> list[VariantOutcome]:
@@ -72,14 +62,14 @@ def run_variants(study: Reconstruction, *, quiet: bool = True) -> list[VariantOu
         check_outputs(names, model, f"variants[{k}]")
     found = []
     for variant, model in zip(study.variants, follow(models, "variants", quiet=quiet), strict=True):
-        rows = _rows(study, model)
-        batch = model.run_batch(rows)
-        if batch.status[0] not in complete_status(model):
-            raise StudyError(f"variant {variant.label!r} ended with status {batch.status[0]!r}")
+        evaluator = evaluator_of(model, variant.model.options, study.effects)
+        batch = evaluator.evaluate(_rows(study, model))
         complete = np.isin(batch.status, list(complete_status(model)))
+        if not complete[0]:
+            raise StudyError(f"variant {variant.label!r} ended with status {batch.status[0]!r}")
         place = [item.name for item in model.outputs]
-        spread = {name: _spread(batch.outputs[complete, place.index(name)]) for name in names}
-        found.append(VariantOutcome(variant.label, int(complete[1:].sum()), spread))
+        ranges = {name: _range(batch.outputs[complete, place.index(name)]) for name in names}
+        found.append(VariantOutcome(variant.label, int(complete[1:].sum()), ranges))
     return found
 
 
@@ -89,11 +79,11 @@ def outputs_of(study: Reconstruction) -> list[str]:
 
 
 def _load(study: Reconstruction, k: int) -> Model:
-    choice = study.variants[k].model
+    """Return the model of a variant, with the study's effects."""
     try:
-        model = load_model(choice.name, choice.options)
+        model = load_study_model(study.model_copy(update={"model": study.variants[k].model}))
         fixed_values(study.fixed, model)
-    except (ValueError, TypeError, UserError) as error:
+    except UserError as error:
         raise UserError(f"variants[{k}]: {error}") from None
     return model
 
@@ -108,13 +98,11 @@ def _rows(study: Reconstruction, model: Model) -> NDArray[np.float64]:
     return np.concatenate([nominal[None], np.clip(factors * nominal, low, high)])
 
 
-def _spread(values: NDArray[np.float64]) -> VariantSpread:
+def _range(values: NDArray[np.float64]) -> Range:
     known = values[1:][np.isfinite(values[1:])]
     if not known.size:
-        return VariantSpread(float(values[0]), np.nan, np.nan, np.nan)
-    return VariantSpread(
-        float(values[0]), float(known.min()), float(np.median(known)), float(known.max())
-    )
+        return Range(float(values[0]), np.nan, np.nan, np.nan)
+    return Range(float(values[0]), float(known.min()), float(np.median(known)), float(known.max()))
 
 
 def variant_table(study: Reconstruction, found: Sequence[VariantOutcome], model: Model) -> Table:
@@ -131,7 +119,9 @@ def variant_table(study: Reconstruction, found: Sequence[VariantOutcome], model:
     """
     rows = []
     for label, ranges in variant_ranges(study, found, model).items():
-        cells = [f"{number(r.median)} ({number(r.low)} to {number(r.high)})" for r in ranges]
+        cells = [
+            f"{number(r.median)} ({number(r.low)} to {number(r.high)})" for r in ranges.values()
+        ]
         rows.append([label, *cells])
     caption = (
         f"Median and range of {PERTURBED} runs with inputs perturbed by up to {100.0 * SIZE:g} %, "
@@ -142,8 +132,8 @@ def variant_table(study: Reconstruction, found: Sequence[VariantOutcome], model:
 
 def variant_ranges(
     study: Reconstruction, found: Sequence[VariantOutcome], model: Model
-) -> dict[str, list[Range]]:
-    """Return the ranges of the variants by label of the output, in the units of the tables.
+) -> dict[str, dict[str, Range]]:
+    """Return the range by variant, by label of the output, in the units of the tables.
 
     Parameters
     ----------
@@ -159,8 +149,7 @@ def variant_ranges(
     ranges = {}
     for name in outputs_of(study):
         scale = units.factor(si[name], given[name])
-        ranges[style.label(name, given[name])] = [
-            Range(outcome.label, *(scale * value for value in vars(outcome.outputs[name]).values()))
-            for outcome in found
-        ]
+        ranges[style.label(name, given[name])] = {
+            outcome.label: outcome.outputs[name].times(scale) for outcome in found
+        }
     return ranges

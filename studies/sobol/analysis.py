@@ -114,7 +114,8 @@ class SobolAnalysis(FactorAnalysis):
     @property
     def reported(self) -> dict[str, IndexedOutput]:
         """Reported outputs that have indices."""
-        return {name: self.indexed[name] for name in self.convergence}
+        indexed = self.indexed
+        return {name: indexed[name] for name in self.convergence}
 
 
 @dataclass(frozen=True)

@@ -110,3 +110,65 @@ def test_a_reconstruction_is_no_study_of_runs(case: tuple[Answer, ResultsFolder]
     said = told(mcstudy("sensitivity", case[1].path))
     assert "is the folder of a study of kind reconstruction" in said
     assert "drawn again by 'mcstudy reconstruct'" in told(mcstudy("report", case[1].path))
+
+
+VARIANTS = """\
+format = "mcstudy-study/1"
+kind = "reconstruction"
+name = "hoods"
+title = "Two hoods"
+[model]
+name = "headform"
+options = { hood_curve = [[0.0, 0.0], [0.1, 10000.0]] }
+[fixed]
+hood_damping = { value = 0.0, unit = "N s/m" }
+friction_body_car = { value = 0.0 }
+[[tables]]
+title = "Published"
+units = { hic15 = "1", peak_force = "kN" }
+rows = [{ label = "a test", values = { hic15 = 700.0 } }]
+[[variants]]
+label = "soft"
+model = { name = "headform", options = { hood_curve = [[0.0, 0.0], [0.1, 10000.0]] } }
+[[variants]]
+label = "stiff"
+model = { name = "headform", options = { hood_curve = [[0.0, 0.0], [0.1, 20000.0]] } }
+"""
+
+
+def test_variants_differ_by_what_they_do_not_share(tmp_path: Path) -> None:
+    path = tmp_path / "hoods.toml"
+    path.write_text(VARIANTS)
+    out = ResultsFolder(tmp_path / "out")
+    assert mcstudy("reconstruct", path, "--out", out.path).code == 0
+    analysis = out.read_json("analysis.json")
+    soft, stiff = analysis["variants"]
+    assert [soft["label"], stiff["label"]] == ["soft", "stiff"]
+    assert soft["runs"] == stiff["runs"] == 24
+    assert soft["outputs"]["hic15"]["nominal"] == analysis["outputs"]["hic15"]
+    # HIC goes with the stiffness to the power of 0.75, the peak force with its root.
+    for key in ("nominal", "low", "median", "high"):
+        ratio = {name: stiff["outputs"][name][key] / soft["outputs"][name][key]
+                 for name in ("hic15", "peak_force")}  # fmt: skip
+        assert ratio["hic15"] == pytest.approx(2.0**0.75, rel=2e-3)
+        assert ratio["peak_force"] == pytest.approx(2.0**0.5, rel=2e-3)
+    # 0.3 % of the speed alone are 0.75 % of HIC15.
+    hic15 = soft["outputs"]["hic15"]
+    assert 0.99 < hic15["low"] / hic15["nominal"] < 0.998
+    assert hic15["low"] < hic15["median"] < hic15["high"]
+    report = (out.path / "report.html").read_text()
+    assert "One change at a time" in report and "stiff" in report
+
+
+@pytest.mark.parametrize(("old", "new", "said"), [
+    ('label = "stiff"', 'label = "soft"', "the label 'soft' stands twice"),
+    ('[[0.0, 0.0], [0.1, 20000.0]]', '[[0.0, 0.0], [0.1, -1.0]]', "variants[1]: model: "),
+    ('model = { name = "headform", options = { hood_curve = [[0.0, 0.0], [0.1, 20000.0]] } }',
+     'model = { name = "multibody" }', "variants[1]"),
+])  # fmt: skip
+def test_a_wrong_variant_is_named(old: str, new: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "hoods.toml"
+    assert old in VARIANTS
+    path.write_text(VARIANTS.replace(old, new))
+    assert said in told(mcstudy("reconstruct", path, "--out", tmp_path / "out"))
+    assert not (tmp_path / "out").exists()

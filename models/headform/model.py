@@ -1,45 +1,23 @@
 """The headform impactor test behind the model protocol."""
 
-import hashlib
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models import data
-from models.contact.corridor import Corridor, load_corridors
-from models.contact.headform import HeadformContact
-from models.contact.law import (
-    DAMPING_ONSET,
-    KNOTS,
-    SURFACE,
-    ForceCurve,
-    combine_curves,
-    interpolate_law,
-    law_of,
-    stiffest_slope,
-)
+from models.contact.law import ForceCurve
 from models.criteria.units import STANDARD_GRAVITY
-from models.declaration import read_channels, read_inputs, read_outputs, run_rows
+from models.declaration import read_channels, read_outputs, run_rows
 from models.effects.chain import build_chain
 from models.effects.reading import Reading, Record, record_reading
 from models.effects.registry import effects_of
 from models.headform import outcome
-from models.headform.impact import (
-    COLUMNS,
-    DEEPEST,
-    END_TIME,
-    NORMAL,
-    SAMPLES,
-    SUMMARY,
-    TANGENTIAL,
-    Impactor,
-    Surface,
-    strike,
-)
-from models.headform.outcome import SAMPLING_RATE, Test
+from models.headform.impact import END_TIME, Impactor
+from models.headform.outcome import Test
+from models.headform.target import SAMPLING_RATE, Target, vinyl_skin
+from models.headform.zone_target import ZoneTarget
 from models.protocol import (
     OK,
     Batch,
@@ -48,26 +26,12 @@ from models.protocol import (
     Run,
     complete_inputs,
 )
-from models.vehicle.profile import load_vehicle
 
 Array = NDArray[np.float64]
 
-LONGEST_CONTACT = 1.0
-"""s of contact after which a run counts as failed."""
-FINEST = 5
-"""Smallest number of steps per sample."""
-PHASE = 0.05
-"""Largest step times the highest natural frequency of the contact (1 is a radian)."""
-DAMPING_WEIGHT = 25.0
-"""Weight of a damping rate against a frequency in the step: its force starts with a jump."""
-MAX_STEPS = 4000
-"""Largest number of steps per sample."""
-
-ELASTIC = 1.000001
-"""Unloading ratio of an elastic spring; a force curve requires more than one."""
-
 TIME_LIMIT = "time_limit"
 NOT_FINITE = "not_finite"
+NO_IMPACT = "no_impact"
 
 _TABLE = data.load("headform.toml")
 _OUTPUTS = read_outputs(_TABLE)
@@ -144,36 +108,17 @@ class HeadformModel:
             raise ValueError(f"channel_class must lie within 0 and 4700, given {channel_class}")
         row = data.load("headforms.toml")["headforms"][headform]
         self._gyration = row["inertia"] / (row["mass"] * (0.5 * row["diameter"]) ** 2)
-        self._skin = _skin() if skin == "vinyl" else None
         nominal = {"headform_mass": row["mass"], "headform_diameter": row["diameter"]}
-        self._curve: ForceCurve | None = None
-        self._corridor: Corridor | None = None
-        self._digest = ""
-        if hood_curve is not None:
-            self._curve = _curve_of(hood_curve)
-        else:
-            self._corridor = _corridor_of(corridor, vehicle, zone)
-            median = self._corridor.median
-            if corridor is not None and corridor.endswith(".toml"):
-                curves = repr(self._corridor).encode()
-                self._digest = "+" + hashlib.sha256(curves).hexdigest()[:12]
-            nominal |= {
-                "hood_unloading_ratio": median.unloading_ratio,
-                "hood_damping": median.damping,
-                "hood_damping_onset": DAMPING_ONSET if median.damping > 0.0 else 0.0,
-            }
-        self._inputs = tuple(
-            replace(item, nominal=float(nominal.get(item.name, item.nominal)))
-            for item in read_inputs(_TABLE)
-            if self._corridor is not None or item.name != "hood_stiffness"
+        self._target: Target = ZoneTarget(
+            nominal, vinyl_skin() if skin == "vinyl" else None, hood_curve, corridor, vehicle, zone
         )
         self._chain = build_chain(self.name, effects)
-        self._inputs += self._chain.inputs
+        self._inputs = self._target.inputs + self._chain.inputs
 
     @property
     def version(self) -> str:
         """Version of the model's data and equations, with a digest of a corridor file's curves."""
-        return str(_TABLE["version"]) + self._digest
+        return str(_TABLE["version"]) + self._target.digest
 
     @property
     def inputs(self) -> tuple[Input, ...]:
@@ -228,7 +173,8 @@ class HeadformModel:
         test = self._strike(values)
         status, measured = self._judge(test, outputs)
         ended = "separation" if status == OK else status
-        return Run(values, status, ended, measured, outcome.histories(test, channels))
+        histories = {} if test is None else outcome.histories(test, channels)
+        return Run(values, status, ended, measured, histories)
 
     def run_batch(self, rows: Array, started: Callable[[int], None] | None = None) -> Batch:
         """Run rows of inputs.
@@ -249,125 +195,41 @@ class HeadformModel:
 
     def hood_curve(self, values: Mapping[str, float]) -> ForceCurve:
         """Return the loading curve of the hood for all inputs by name."""
-        if self._corridor is not None:
-            curve = self._corridor.curve(values["hood_stiffness"])
-        else:
-            assert self._curve is not None
-            curve = self._curve
-        scaled = ForceCurve(
-            curve.penetration,
-            curve.force * values["hood_force_scale"],
-            values["hood_unloading_ratio"],
-            values["hood_damping"],
-        )
-        return self._chain.act("curve", scaled, values)
+        return self._target.hood_curve(values, self._chain)
 
-    def _strike(self, given: Mapping[str, float]) -> Test:
+    def _strike(self, given: Mapping[str, float]) -> Test | None:
         values = self._chain.act("inputs", given, given)
-        curve = self.hood_curve(values)
-        contact = self._chain.act(
-            "contact",
-            HeadformContact(
-                values["friction_body_car"], curve.damping, values["hood_damping_onset"]
-            ),
-            values,
-        )
-        laws = np.zeros((1, KNOTS, 4))
-        skin = self._skin
-        if contact.skin_compliance > 0.0:
-            skin = _in_series(skin, contact.skin_compliance, float(curve.force[-1]))
-        if skin is None:
-            count = law_of(curve, laws[0])
-        else:
-            count = combine_curves(
-                curve.penetration, curve.force, curve.unloading_ratio,
-                skin.penetration, skin.force, skin.unloading_ratio, laws[0],
-            )  # fmt: skip
         mass, radius = values["headform_mass"], 0.5 * values["headform_diameter"]
         impactor = Impactor(mass, self._gyration * mass * radius**2, radius)
-        stiffest = stiffest_slope(curve.penetration, curve.force, curve.unloading_ratio)
-        frequency = math.sqrt(stiffest / mass) + DAMPING_WEIGHT * contact.damping / mass
-        stride = math.ceil(frequency / (PHASE * SAMPLING_RATE))
-        stride = min(max(stride, FINEST), MAX_STEPS)
-        speed, angle = values["impact_speed"], values["impact_angle"]
-        speeds = (speed * math.cos(angle), speed * math.sin(angle))
-        record = np.empty((round(LONGEST_CONTACT * SAMPLING_RATE), COLUMNS))
-        summary = np.zeros(SUMMARY)
-        strike(
-            impactor,
-            Surface(contact.friction, contact.damping, contact.onset, contact.rate_share,
-                    contact.rate_exponent, contact.moved_mass, contact.moved_depth),
-            laws, count, *speeds, 1.0 / (SAMPLING_RATE * stride), stride, record, summary,
-        )  # fmt: skip
-        deepest = summary[DEEPEST]
-        hood = float(interpolate_law(laws, 0, count, SURFACE, deepest))
-        kept = record[: int(summary[SAMPLES])].copy()
+        struck = self._target.strike(values, self._chain, impactor)
+        if struck is None:
+            return None
         return Test(
             impactor=impactor,
-            speeds=speeds,
-            record=kept,
-            reading=self._reading(kept, mass, values),
-            summary=summary,
-            dent=(hood, hood * (1.0 - 1.0 / curve.unloading_ratio)),
+            strike=struck,
+            reading=self._reading(struck.force, mass, values),
             quiet=outcome.quiet_samples(self.channel_class),
         )
 
-    def _reading(self, record: Array, mass: float, values: Mapping[str, float]) -> Record:
-        """Return the recorded acceleration, normal and tangential, with free flight around it."""
+    def _reading(self, force: Array, mass: float, values: Mapping[str, float]) -> Record:
+        """Return the recorded components of the acceleration, with free flight around them."""
         quiet = outcome.quiet_samples(self.channel_class)
-        padded = np.zeros((record.shape[0] + 2 * quiet, 2))
-        forces = record[:, NORMAL : TANGENTIAL + 1]
-        padded[quiet : quiet + record.shape[0]] = forces / (mass * STANDARD_GRAVITY)
+        padded = np.zeros((len(force) + 2 * quiet, force.shape[1]))
+        padded[quiet : quiet + len(force)] = force / (mass * STANDARD_GRAVITY)
         felt = Reading(padded, self.channel_class)
         return record_reading(self._chain, values, felt, SAMPLING_RATE, origin=quiet)
 
     def _judge(
-        self, test: Test, wanted: Collection[str] | None = None
+        self, test: Test | None, wanted: Collection[str] | None = None
     ) -> tuple[str, dict[str, float]]:
         """Return the status of a test and its outputs, or only the wanted ones."""
         names = [item.name for item in _OUTPUTS if wanted is None or item.name in wanted]
         empty = dict.fromkeys(names, math.nan)
-        if not np.all(np.isfinite(test.record)):
+        if test is None:
+            return NO_IMPACT, empty
+        if not np.all(np.isfinite(test.strike.record)):
             return NOT_FINITE, empty
-        if math.isnan(test.summary[END_TIME]):
+        if math.isnan(test.strike.summary[END_TIME]):
             return TIME_LIMIT, empty
         measures = outcome.measures(test) if names else {}
         return OK, {name: measures[name]() for name in names}
-
-
-def _in_series(skin: ForceCurve | None, compliance: float, force: float) -> ForceCurve:
-    """Return a skin in series with a linear elastic spring."""
-    spring = ForceCurve(np.array([0.0, compliance * force]), np.array([0.0, force]), ELASTIC)
-    if skin is None:
-        return spring
-    return ForceCurve(skin.penetration + compliance * skin.force, skin.force, skin.unloading_ratio)
-
-
-def _skin() -> ForceCurve:
-    row = data.load("headforms.toml")["skin"]
-    knots = np.array(row["curve"])
-    return ForceCurve(knots[:, 0].copy(), knots[:, 1].copy(), row["unloading_ratio"])
-
-
-def _curve_of(knots: Sequence[Sequence[float]]) -> ForceCurve:
-    try:
-        table = np.array(knots, dtype=np.float64)
-        if table.ndim != 2 or table.shape[1] != 2:
-            raise ValueError("must be a list of pairs [penetration m, force N]")
-        return ForceCurve(table[:, 0].copy(), table[:, 1].copy(), 2.0)
-    except (ValueError, TypeError) as error:
-        raise ValueError(f"hood_curve: {error}") from None
-
-
-def _corridor_of(corridor: str | None, vehicle: str | None, zone: str) -> Corridor:
-    if corridor is None:
-        car = load_vehicle(vehicle or "family_car_1990s")
-        index = car.zone_index(zone)
-        if index < 0:
-            names = ", ".join(entry.name for entry in car.zones)
-            raise ValueError(f"vehicle {car.name!r} has no zone {zone!r}; it has {names}")
-        return car.zones[index].corridor
-    table = load_corridors(corridor)
-    if zone not in table:
-        raise ValueError(f"corridor {corridor!r} has no zone {zone!r}; it has {', '.join(table)}")
-    return table[zone]

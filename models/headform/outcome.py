@@ -1,5 +1,6 @@
 """Outputs and histories of a headform test."""
 
+import functools
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
@@ -22,12 +23,11 @@ from models.headform.impact import (
     SPIN,
     Impactor,
 )
+from models.headform.target import SAMPLING_RATE, Strike
 from models.protocol import History, chosen_histories
 
 Array = NDArray[np.float64]
 
-SAMPLING_RATE = 20_000.0
-"""Hz of the accelerometer (SAE J211 asks for ten times the channel frequency class)."""
 QUIET = 0.005
 """Least free flight (s) before and after the contact; more where the filter needs it."""
 
@@ -39,27 +39,23 @@ class Test:
     Attributes
     ----------
     impactor : Impactor
-    speeds : tuple of float
-        Initial speeds into and along the surface, m/s.
-    record : (samples, COLUMNS) array
-        See ``models.headform.impact.strike``.
+    strike : Strike
+        Raw results.
     reading : Record
-        Recorded normal and tangential acceleration, g.
-    summary : (SUMMARY,) array
-        See ``models.headform.impact.strike``.
-    dent : tuple of float
-        Largest and permanent penetration of the hood, m.
+        Recorded components of the acceleration, the first along the initial normal, g.
     quiet : int
         Samples of free flight before and after the contact.
     """
 
     impactor: Impactor
-    speeds: tuple[float, float]
-    record: Array
+    strike: Strike
     reading: Record
-    summary: Array
-    dent: tuple[float, float]
     quiet: int
+
+    @property
+    def acceleration(self) -> Array:
+        """Recorded resultant acceleration (n,), g."""
+        return np.asarray(functools.reduce(np.hypot, self.reading.acceleration.T))
 
 
 def quiet_samples(channel_class: float) -> int:
@@ -70,12 +66,13 @@ def quiet_samples(channel_class: float) -> int:
 
 def measures(test: Test) -> dict[str, Callable[[], float]]:
     """Return the output evaluators, by name, of a test that ended."""
-    acceleration = np.hypot(*test.reading.acceleration.T)
+    acceleration = test.acceleration
     time = np.arange(acceleration.size) / SAMPLING_RATE
-    record, summary = test.record, test.summary
-    energy = 0.5 * test.impactor.mass * (test.speeds[0] ** 2 + test.speeds[1] ** 2)
-    left = 0.5 * test.impactor.mass * (summary[REBOUND] ** 2 + summary[END_SLIDE] ** 2)
-    left += 0.5 * test.impactor.inertia * summary[END_SPIN] ** 2
+    struck, impactor = test.strike, test.impactor
+    record, summary = struck.record, struck.summary
+    energy = 0.5 * impactor.mass * (struck.speeds[0] ** 2 + struck.speeds[1] ** 2)
+    left = 0.5 * impactor.mass * (summary[REBOUND] ** 2 + summary[END_SLIDE] ** 2)
+    left += 0.5 * impactor.inertia * summary[END_SPIN] ** 2
     return {
         "hic15": lambda: head_injury_criterion(time, acceleration, 0.015)[0],
         "hic36": lambda: head_injury_criterion(time, acceleration, 0.036)[0],
@@ -83,8 +80,8 @@ def measures(test: Test) -> dict[str, Callable[[], float]]:
         "clip_3ms_consecutive": lambda: clip_level(time, acceleration, mode="consecutive"),
         "peak_head_acceleration": lambda: float(acceleration.max()),
         "peak_force": lambda: float(record[:, NORMAL].max()),
-        "hood_intrusion": lambda: test.dent[0],
-        "permanent_dent": lambda: test.dent[1],
+        "hood_intrusion": lambda: struck.dent[0],
+        "permanent_dent": lambda: struck.dent[1],
         "rebound_speed": lambda: float(summary[REBOUND]),
         "contact_duration": lambda: float(summary[END_TIME]),
         "head_angular_velocity": lambda: float(np.abs(record[:, SPIN]).max()),
@@ -95,10 +92,10 @@ def measures(test: Test) -> dict[str, Callable[[], float]]:
 def histories(test: Test, wanted: Collection[str] | None) -> dict[str, History]:
     """Return the histories of headform and hood, or the wanted ones; time 0 is first contact."""
     quiet = test.quiet
-    record, last = test.record, test.record[-1]
+    record, last = test.strike.record, test.strike.record[-1]
     before = np.arange(-quiet, 0) / SAMPLING_RATE
     after = np.arange(1, quiet + 1) / SAMPLING_RATE
-    rate, slide = test.speeds
+    rate, slide = test.strike.speeds
 
     def padded(column: int, first: Array | float, end: Array | float) -> Array:
         longer = np.empty(record.shape[0] + 2 * quiet)
@@ -113,9 +110,12 @@ def histories(test: Test, wanted: Collection[str] | None) -> dict[str, History]:
 
     sources: dict[str, dict[str, tuple[str, Callable[[], Array]]]] = {
         "head": {
-            "acceleration": ("g", lambda: np.hypot(*test.reading.acceleration.T)),
+            "acceleration": ("g", lambda: test.acceleration),
             "acceleration_normal": ("g", lambda: test.reading.acceleration[:, 0]),
-            "acceleration_tangential": ("g", lambda: test.reading.acceleration[:, 1]),
+            "acceleration_tangential": (
+                "g",
+                lambda: np.asarray(functools.reduce(np.hypot, test.reading.acceleration.T[1:])),
+            ),
             "velocity_normal": ("m/s", lambda: padded(RATE, rate, last[RATE])),
             "velocity_tangential": ("m/s", lambda: padded(SLIDE, slide, last[SLIDE])),
             "angular_velocity": ("rad/s", lambda: padded(SPIN, 0.0, last[SPIN])),

@@ -1,0 +1,173 @@
+"""What a headform strikes, as an interface: inputs, loading curve, and the impact itself."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models import data
+from models.contact.law import ForceCurve, combine_curves, law_of
+from models.effects.chain import EffectChain
+from models.headform.impact import Impactor
+from models.protocol import Input
+
+Array = NDArray[np.float64]
+
+SAMPLING_RATE = 20_000.0
+"""Hz of the accelerometer (SAE J211 asks for ten times the channel frequency class)."""
+LONGEST_CONTACT = 1.0
+"""s of contact after which a run counts as failed."""
+FINEST = 5
+"""Smallest number of steps per sample."""
+PHASE = 0.05
+"""Largest step times the highest natural frequency of the contact (1 is a radian)."""
+DAMPING_WEIGHT = 25.0
+"""Weight of a damping rate against a frequency in the step: its force starts with a jump."""
+MAX_STEPS = 4000
+"""Largest number of steps per sample."""
+ELASTIC = 1.000001
+"""Unloading ratio of an elastic spring; a force curve requires more than one."""
+
+
+@dataclass(frozen=True)
+class Strike:
+    """Raw results of a step loop.
+
+    Attributes
+    ----------
+    speeds : tuple of float
+        Initial speeds into and along the surface at the point struck, m/s.
+    record : (samples, columns) array
+        First columns as in ``models.headform.impact.strike``.
+    summary : (SUMMARY,) array
+        See ``models.headform.impact.strike``.
+    force : (samples, 2 or 3) array
+        Components of the force on the headform, the first along the initial normal, N.
+    dent : tuple of float
+        Largest and permanent penetration of the surface, m.
+    """
+
+    speeds: tuple[float, float]
+    record: Array
+    summary: Array
+    force: Array
+    dent: tuple[float, float]
+
+
+class Target(Protocol):
+    """A surface that a headform strikes.
+
+    Attributes
+    ----------
+    inputs : tuple of Input
+        Inputs of the test, those of the headform included.
+    effects : tuple of str
+        Effects that apply to it.
+    digest : str
+        Identifies a user's own file; part of the model's version.
+    """
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """Inputs of the test."""
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Effects that apply."""
+
+    @property
+    def digest(self) -> str:
+        """Digest of a user's own file, or an empty text."""
+
+    def hood_curve(self, values: Mapping[str, float], chain: EffectChain) -> ForceCurve:
+        """Return the loading curve of the hood, with effects.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            All inputs by name.
+        chain : EffectChain
+            Effects that are switched on.
+        """
+
+    def strike(
+        self, values: Mapping[str, float], chain: EffectChain, impactor: Impactor
+    ) -> Strike | None:
+        """Return the impact, or None if the headform does not meet the surface.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            All inputs by name, with effects.
+        chain : EffectChain
+            Effects that are switched on.
+        impactor : Impactor
+            The headform.
+        """
+
+
+def steps_per_sample(stiffest: float, damping: float, mass: float) -> int:
+    """Return the number of steps of a sample that the stiffest contact needs.
+
+    Parameters
+    ----------
+    stiffest : float
+        Largest slope of the force, N/m.
+    damping : float
+        N s/m.
+    mass : float
+        kg.
+    """
+    frequency = np.sqrt(stiffest / mass) + DAMPING_WEIGHT * damping / mass
+    stride = int(np.ceil(frequency / (PHASE * SAMPLING_RATE)))
+    return min(max(stride, FINEST), MAX_STEPS)
+
+
+def vinyl_skin() -> ForceCurve:
+    """Return the loading curve of the headforms' vinyl skin."""
+    row = data.load("headforms.toml")["skin"]
+    knots = np.array(row["curve"])
+    return ForceCurve(knots[:, 0].copy(), knots[:, 1].copy(), row["unloading_ratio"])
+
+
+def skin_of(skin: ForceCurve | None, compliance: float, force: float) -> ForceCurve | None:
+    """Return a headform's skin in series with a linear elastic spring.
+
+    Parameters
+    ----------
+    skin : ForceCurve, optional
+        By default the headform is rigid.
+    compliance : float
+        m/N; 0 for none.
+    force : float
+        Force up to which a spring alone has a knot, N.
+    """
+    if compliance == 0.0:
+        return skin
+    if skin is None:
+        return ForceCurve(np.array([0.0, compliance * force]), np.array([0.0, force]), ELASTIC)
+    return ForceCurve(skin.penetration + compliance * skin.force, skin.force, skin.unloading_ratio)
+
+
+def write_law(curve: ForceCurve, skin: ForceCurve | None, law: Array) -> int:
+    """Write the combined law of a surface and a headform and return its number of knots.
+
+    Parameters
+    ----------
+    curve : ForceCurve
+        The surface.
+    skin : ForceCurve, optional
+        The headform's skin; by default it is rigid.
+    law : (KNOTS, 4) array
+        Filled.
+    """
+    if skin is None:
+        return int(law_of(curve, law))
+    return int(
+        combine_curves(
+            curve.penetration, curve.force, curve.unloading_ratio,
+            skin.penetration, skin.force, skin.unloading_ratio, law,
+        )
+    )  # fmt: skip

@@ -1,0 +1,195 @@
+"""A headform against a plane with the loading curve of one zone."""
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models import data
+from models.contact.corridor import Corridor, load_corridors
+from models.contact.headform import HeadformContact
+from models.contact.law import (
+    DAMPING_ONSET,
+    KNOTS,
+    SURFACE,
+    ForceCurve,
+    interpolate_law,
+    stiffest_slope,
+)
+from models.declaration import read_inputs
+from models.effects.chain import EffectChain
+from models.effects.registry import effects_of
+from models.headform.impact import (
+    COLUMNS,
+    DEEPEST,
+    NORMAL,
+    SAMPLES,
+    SUMMARY,
+    TANGENTIAL,
+    Impactor,
+    Surface,
+    strike,
+)
+from models.headform.target import (
+    LONGEST_CONTACT,
+    SAMPLING_RATE,
+    Strike,
+    skin_of,
+    steps_per_sample,
+    write_law,
+)
+from models.protocol import Input
+from models.vehicle.profile import load_vehicle
+
+Array = NDArray[np.float64]
+
+
+class ZoneTarget:
+    """A plane struck by a headform.
+
+    Parameters
+    ----------
+    nominal : mapping of str to float
+        Nominal values of the headform's inputs.
+    skin : ForceCurve, optional
+        The headform's skin; by default it is rigid.
+    hood_curve, corridor, vehicle, zone
+        See ``models.headform.model.HeadformModel``.
+
+    Raises
+    ------
+    ValueError
+        If the curve, corridor, vehicle or zone is not valid.
+    """
+
+    effects: tuple[str, ...] = effects_of("headform")
+
+    def __init__(
+        self,
+        nominal: Mapping[str, float],
+        skin: ForceCurve | None,
+        hood_curve: Sequence[Sequence[float]] | None,
+        corridor: str | None,
+        vehicle: str | None,
+        zone: str,
+    ) -> None:
+        self._skin = skin
+        self._curve: ForceCurve | None = None
+        self._corridor: Corridor | None = None
+        self.digest = ""
+        known = dict(nominal)
+        if hood_curve is not None:
+            self._curve = _curve_of(hood_curve)
+        else:
+            self._corridor = _corridor_of(corridor, vehicle, zone)
+            median = self._corridor.median
+            if corridor is not None and corridor.endswith(".toml"):
+                curves = repr(self._corridor).encode()
+                self.digest = "+" + hashlib.sha256(curves).hexdigest()[:12]
+            known |= {
+                "hood_unloading_ratio": median.unloading_ratio,
+                "hood_damping": median.damping,
+                "hood_damping_onset": DAMPING_ONSET if median.damping > 0.0 else 0.0,
+            }
+        self.inputs: tuple[Input, ...] = tuple(
+            replace(item, nominal=float(known.get(item.name, item.nominal)))
+            for item in read_inputs(data.load("headform.toml"))
+            if self._corridor is not None or item.name != "hood_stiffness"
+        )
+
+    def hood_curve(self, values: Mapping[str, float], chain: EffectChain) -> ForceCurve:
+        """Return the loading curve of the zone, with effects.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            All inputs by name.
+        chain : EffectChain
+            Effects that are switched on.
+        """
+        if self._corridor is not None:
+            curve = self._corridor.curve(values["hood_stiffness"])
+        else:
+            assert self._curve is not None
+            curve = self._curve
+        scaled = ForceCurve(
+            curve.penetration,
+            curve.force * values["hood_force_scale"],
+            values["hood_unloading_ratio"],
+            values["hood_damping"],
+        )
+        return chain.act("curve", scaled, values)
+
+    def strike(
+        self, values: Mapping[str, float], chain: EffectChain, impactor: Impactor
+    ) -> Strike:
+        """Return the impact.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            All inputs by name, with effects.
+        chain : EffectChain
+            Effects that are switched on.
+        impactor : Impactor
+            The headform.
+        """
+        curve = self.hood_curve(values, chain)
+        contact = chain.act(
+            "contact",
+            HeadformContact(
+                values["friction_body_car"], curve.damping, values["hood_damping_onset"]
+            ),
+            values,
+        )
+        laws = np.zeros((1, KNOTS, 4))
+        skin = skin_of(self._skin, contact.skin_compliance, float(curve.force[-1]))
+        count = write_law(curve, skin, laws[0])
+        stiffest = stiffest_slope(curve.penetration, curve.force, curve.unloading_ratio)
+        stride = steps_per_sample(stiffest, contact.damping, impactor.mass)
+        speed, angle = values["impact_speed"], values["impact_angle"]
+        speeds = (speed * math.cos(angle), speed * math.sin(angle))
+        record = np.empty((round(LONGEST_CONTACT * SAMPLING_RATE), COLUMNS))
+        summary = np.zeros(SUMMARY)
+        strike(
+            impactor,
+            Surface(contact.friction, contact.damping, contact.onset, contact.rate_share,
+                    contact.rate_exponent, contact.moved_mass, contact.moved_depth),
+            laws, count, *speeds, 1.0 / (SAMPLING_RATE * stride), stride, record, summary,
+        )  # fmt: skip
+        kept = record[: int(summary[SAMPLES])].copy()
+        hood = float(interpolate_law(laws, 0, count, SURFACE, summary[DEEPEST]))
+        return Strike(
+            speeds=speeds,
+            record=kept,
+            summary=summary,
+            force=kept[:, NORMAL : TANGENTIAL + 1],
+            dent=(hood, hood * (1.0 - 1.0 / curve.unloading_ratio)),
+        )
+
+
+def _curve_of(knots: Sequence[Sequence[float]]) -> ForceCurve:
+    try:
+        table = np.array(knots, dtype=np.float64)
+        if table.ndim != 2 or table.shape[1] != 2:
+            raise ValueError("must be a list of pairs [penetration m, force N]")
+        return ForceCurve(table[:, 0].copy(), table[:, 1].copy(), 2.0)
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"hood_curve: {error}") from None
+
+
+def _corridor_of(corridor: str | None, vehicle: str | None, zone: str) -> Corridor:
+    if corridor is None:
+        car = load_vehicle(vehicle or "family_car_1990s")
+        index = car.zone_index(zone)
+        if index < 0:
+            names = ", ".join(entry.name for entry in car.zones)
+            raise ValueError(f"vehicle {car.name!r} has no zone {zone!r}; it has {names}")
+        return car.zones[index].corridor
+    table = load_corridors(corridor)
+    if zone not in table:
+        raise ValueError(f"corridor {corridor!r} has no zone {zone!r}; it has {', '.join(table)}")
+    return table[zone]

@@ -94,7 +94,7 @@ class FacetModel(MultibodyModel):
             ploughing=scenario.zones.ploughing,
             skin=bare_skin(len(SEGMENTS))
             if self._bare
-            else build_skin(scenario.body, self._subdivisions),
+            else build_skin(scenario.body.semi_axes, self._subdivisions),
             distributed=self._distributed,
             found=self._found,
         )

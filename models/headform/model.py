@@ -14,6 +14,7 @@ from models.effects.chain import build_chain
 from models.effects.reading import Reading, Record, record_reading
 from models.effects.registry import effects_of
 from models.headform import outcome
+from models.headform.facet_target import FacetTarget
 from models.headform.impact import END_TIME, Impactor
 from models.headform.outcome import Test
 from models.headform.target import SAMPLING_RATE, Target, vinyl_skin
@@ -32,6 +33,8 @@ Array = NDArray[np.float64]
 TIME_LIMIT = "time_limit"
 NOT_FINITE = "not_finite"
 NO_IMPACT = "no_impact"
+SURFACES = ("zone", "facet")
+"""What a headform strikes."""
 
 _TABLE = data.load("headform.toml")
 _OUTPUTS = read_outputs(_TABLE)
@@ -64,6 +67,9 @@ class HeadformModel:
         Zone of the corridor or vehicle.
     skin : {"rigid", "vinyl"}
         Whether the headform's skin deforms; the case's paper found it negligible on a hood.
+    surface : {"zone", "facet"}
+        A plane with the curve of one zone, or the whole front of the vehicle as a surface of
+        facets, struck at a wrap-around distance and a lateral position.
     channel_class : float
         Channel frequency class of the accelerometer; 0 leaves the signal unfiltered.
     effects : mapping, optional
@@ -92,6 +98,7 @@ class HeadformModel:
         vehicle: str | None = None,
         zone: str = "hood",
         skin: str = "rigid",
+        surface: str = "zone",
         channel_class: float = 1000.0,
         effects: Mapping[str, Mapping[str, float]] | None = None,
     ) -> None:
@@ -103,22 +110,36 @@ class HeadformModel:
             raise ValueError("give one of hood_curve, corridor and vehicle, not several")
         if skin not in ("rigid", "vinyl"):
             raise ValueError(f"skin must be 'rigid' or 'vinyl', given {skin!r}")
+        if surface not in SURFACES:
+            raise ValueError(f"surface must be one of {', '.join(SURFACES)}, given {surface!r}")
         self.channel_class = float(channel_class)
         if not 0.0 <= self.channel_class < SAMPLING_RATE / 4.2:
             raise ValueError(f"channel_class must lie within 0 and 4700, given {channel_class}")
         row = data.load("headforms.toml")["headforms"][headform]
         self._gyration = row["inertia"] / (row["mass"] * (0.5 * row["diameter"]) ** 2)
         nominal = {"headform_mass": row["mass"], "headform_diameter": row["diameter"]}
-        self._target: Target = ZoneTarget(
-            nominal, vinyl_skin() if skin == "vinyl" else None, hood_curve, corridor, vehicle, zone
-        )
+        own = vinyl_skin() if skin == "vinyl" else None
+        self.target: Target
+        if surface == "facet":
+            if hood_curve is not None or corridor is not None:
+                raise ValueError(
+                    "surface 'facet' takes the curves of a vehicle: leave hood_curve and corridor "
+                    "out, or write a vehicle file"
+                )
+            self.target = FacetTarget(nominal, own, vehicle)
+            self.effects = self.target.effects
+        else:
+            self.target = ZoneTarget(nominal, own, hood_curve, corridor, vehicle, zone)
+        if effects and (unfit := [name for name in effects if name not in self.effects]):
+            if unfit[0] in effects_of(self.name):
+                raise ValueError(f"effect {unfit[0]!r} applies to surface 'zone' only")
         self._chain = build_chain(self.name, effects)
-        self._inputs = self._target.inputs + self._chain.inputs
+        self._inputs = self.target.inputs + self._chain.inputs
 
     @property
     def version(self) -> str:
         """Version of the model's data and equations, with a digest of a corridor file's curves."""
-        return str(_TABLE["version"]) + self._target.digest
+        return str(_TABLE["version"]) + self.target.digest
 
     @property
     def inputs(self) -> tuple[Input, ...]:
@@ -195,13 +216,13 @@ class HeadformModel:
 
     def hood_curve(self, values: Mapping[str, float]) -> ForceCurve:
         """Return the loading curve of the hood for all inputs by name."""
-        return self._target.hood_curve(values, self._chain)
+        return self.target.hood_curve(values, self._chain)
 
     def _strike(self, given: Mapping[str, float]) -> Test | None:
         values = self._chain.act("inputs", given, given)
         mass, radius = values["headform_mass"], 0.5 * values["headform_diameter"]
         impactor = Impactor(mass, self._gyration * mass * radius**2, radius)
-        struck = self._target.strike(values, self._chain, impactor)
+        struck = self.target.strike(values, self._chain, impactor)
         if struck is None:
             return None
         return Test(

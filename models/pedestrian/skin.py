@@ -127,12 +127,13 @@ def segment_mesh(body: Body, segment: int, subdivisions: int = SUBDIVISIONS) -> 
     return nodes * body.semi_axes[segment], facets
 
 
-def build_skin(body: Body, subdivisions: Sequence[int]) -> Skin:
+def build_skin(semi_axes: Array, subdivisions: Sequence[int]) -> Skin:
     """Return the surface points of all segments of a body.
 
     Parameters
     ----------
-    body : Body
+    semi_axes : (n, 3) array
+        Of the segments' ellipsoids, m.
     subdivisions : (n,) sequence of int
         Of the icosahedron, for each segment: 2 give 162 points, 3 give 642.
     """
@@ -140,7 +141,7 @@ def build_skin(body: Body, subdivisions: Sequence[int]) -> Skin:
     found: dict[int, _Part] = {}
     for level in np.unique(chosen).tolist():
         rows = np.flatnonzero(chosen == level).tolist()
-        found |= dict(zip(rows, _stretch(body.semi_axes[rows], level), strict=True))
+        found |= dict(zip(rows, _stretch(semi_axes[rows], level), strict=True))
     parts = [found[row] for row in range(len(chosen))]
     sizes = np.array([len(part.point) for part in parts])
     clusters = np.array([len(part.centre) for part in parts])

@@ -115,7 +115,7 @@ def touch(
     regions = int(field.region.max()) + 1
     front = FacetFront(
         field, np.array([1.0, 0.0, 0.0, 0.0]), np.full(regions, 0.5), np.zeros(regions),
-        build_skin(replace(body, semi_axes=semi), [3] * COUNT), np.ones(1),
+        build_skin(semi, [3] * COUNT), np.ones(1),
         empty_findings(regions),
     )  # fmt: skip
     ellipsoids = crash().scenario.ellipsoids._replace(
@@ -197,7 +197,7 @@ def test_an_icosphere_is_closed_and_even(subdivisions: int) -> None:
 
 def test_the_skin_has_the_area_of_the_ellipsoids() -> None:
     body = crash().scenario.body
-    skin = build_skin(body, [2] * (COUNT - 1) + [3])
+    skin = build_skin(body.semi_axes, [2] * (COUNT - 1) + [3])
     assert len(skin.point) == 162 * (COUNT - 1) + 642
     first = skin.first_point[skin.first_cluster]
     for k in range(COUNT):

@@ -82,3 +82,17 @@ def wrap_line(mesh: SurfaceMesh, distance: float, stations: Array) -> Array:
         x, z = side[low] + min(max(share, 0.0), 1.0) * (side[high] - side[low])
         found[k] = (x, y, z)
     return found
+
+
+def wrap_point(mesh: SurfaceMesh, distance: float, y: float) -> Array:
+    """Return the point (3,) in m of a wrap-around distance at a lateral station, NaN if none.
+
+    Parameters
+    ----------
+    mesh : SurfaceMesh
+    distance : float
+        Wrap-around distance, m.
+    y : float
+        Lateral station, m.
+    """
+    return np.asarray(wrap_line(mesh, distance, np.array([y]))[0])

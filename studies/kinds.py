@@ -16,6 +16,7 @@ from studies.model_comparison.study import Comparison
 from studies.monte_carlo.study import MonteCarlo
 from studies.morris.study import Morris
 from studies.reconstruction.schema import Reconstruction
+from studies.response_map.study import ResponseMap
 from studies.sobol.study import Sobol
 
 KINDS: dict[str, StudyKind[Any, Any, Any, Any]] = {
@@ -26,6 +27,7 @@ KINDS: dict[str, StudyKind[Any, Any, Any, Any]] = {
         Morris(),
         Injury(),
         Comparison(),
+        ResponseMap(),
     )
 }
 """A new kind of study is its folder and one line here."""

@@ -202,9 +202,7 @@ class FacetTarget:
         kept = record[: int(summary[SAMPLES])].copy()
         if not np.any(kept[:, NORMAL]):
             return None
-        dents = [
-            float(law_surface(ellipsoids, j, contacts.largest[0, j])) for j in range(regions)
-        ]
+        dents = [float(law_surface(ellipsoids, j, contacts.largest[0, j])) for j in range(regions)]
         struck = int(np.argmax(dents))
         lasting = 1.0 - 1.0 / curves[struck].unloading_ratio
         return Strike(
@@ -215,7 +213,9 @@ class FacetTarget:
             dent=(dents[struck], dents[struck] * lasting),
         )
 
-    def _place(self, point: ImpactPoint, heading: Array, radius: float) -> tuple[Array, Array] | None:
+    def _place(
+        self, point: ImpactPoint, heading: Array, radius: float
+    ) -> tuple[Array, Array] | None:
         """Return the centre at first contact and the axes there, or None if it moves away."""
         centre = point.position + radius * point.normal
         travelled = 0.0

@@ -30,7 +30,7 @@ from models.headform.impact import (
     Surface,
     strike,
 )
-from models.headform.outcome import SAMPLING_RATE
+from models.headform.target import SAMPLING_RATE
 
 Array = NDArray[np.float64]
 

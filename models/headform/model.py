@@ -130,9 +130,9 @@ class HeadformModel:
             self.effects = self.target.effects
         else:
             self.target = ZoneTarget(nominal, own, hood_curve, corridor, vehicle, zone)
-        if effects and (unfit := [name for name in effects if name not in self.effects]):
-            if unfit[0] in effects_of(self.name):
-                raise ValueError(f"effect {unfit[0]!r} applies to surface 'zone' only")
+        for name in effects or ():
+            if name in effects_of(self.name) and name not in self.effects:
+                raise ValueError(f"effect {name!r} applies to surface 'zone' only")
         self._chain = build_chain(self.name, effects)
         self._inputs = self.target.inputs + self._chain.inputs
 

@@ -123,9 +123,7 @@ class ZoneTarget:
         )
         return chain.act("curve", scaled, values)
 
-    def strike(
-        self, values: Mapping[str, float], chain: EffectChain, impactor: Impactor
-    ) -> Strike:
+    def strike(self, values: Mapping[str, float], chain: EffectChain, impactor: Impactor) -> Strike:
         """Return the impact.
 
         Parameters

@@ -1,7 +1,6 @@
 """Contact with facets: flat surfaces against the law, borders without jumps, two walls at once."""
 
 import math
-from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 

@@ -10,7 +10,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from models.criteria.units import STANDARD_GRAVITY
-from models.headform.model import SAMPLING_RATE, headform_names
+from models.headform.model import headform_names
+from models.headform.target import SAMPLING_RATE
 from models.protocol import Model
 from models.registry import load_model
 

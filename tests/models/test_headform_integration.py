@@ -14,7 +14,7 @@ from scipy.integrate import cumulative_trapezoid, solve_ivp
 
 from models.criteria import clip_level, head_injury_criterion
 from models.criteria.units import STANDARD_GRAVITY
-from models.headform.model import SAMPLING_RATE
+from models.headform.target import SAMPLING_RATE
 from models.protocol import Run
 from models.registry import load_model
 

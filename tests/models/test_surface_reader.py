@@ -8,7 +8,7 @@ import pytest
 import trimesh
 from builders import Array
 
-from models.vehicle.profile import load_vehicle, wrap_around_distance
+from models.vehicle.profile import load_vehicle, vehicle_names, wrap_around_distance
 from models.vehicle.surface.generator import generate_surface
 from models.vehicle.surface.mesh import SurfaceMesh
 from models.vehicle.surface.reader import UNITS, read_surface
@@ -157,6 +157,20 @@ def test_the_wrap_around_distance_of_the_middle_is_that_of_the_zones() -> None:
         np.testing.assert_allclose(found[[0, 2]], point, atol=0.01)
 
 
+@pytest.mark.parametrize("name", vehicle_names())
+def test_a_wrap_around_line_runs_smoothly_across_the_car_and_is_alike_on_both_sides(
+    name: str,
+) -> None:
+    # Stations that fall between the nodes in every way.
+    stations = np.linspace(-0.62, 0.62, 63)
+    mesh = generate_surface(name)
+    for distance in (1.0, 1.3, 1.7):
+        line = wrap_line(mesh, distance, stations)
+        assert np.isfinite(line).all()
+        assert np.abs(np.diff(line[:, 0])).max() < 0.02
+        np.testing.assert_allclose(line[:, [0, 2]], line[::-1][:, [0, 2]], atol=0.002)
+
+
 def test_a_tape_over_a_quarter_circle_has_its_length() -> None:
     # From the road straight up to the circle's foremost point, then along it.
     angle = np.linspace(0.0, 0.5 * np.pi, 400)
@@ -169,7 +183,7 @@ def test_a_tape_over_a_quarter_circle_has_its_length() -> None:
         np.asarray(box.vertices, float), np.asarray(box.faces, np.int64),
         np.zeros(12, np.int64), ("box",),
     )  # fmt: skip
-    points = section(mesh, 0.1)
+    points = section(mesh, 0.1).reshape(-1, 2)
     np.testing.assert_allclose(np.abs(points).max(axis=0), [0.5, 0.5])
     assert len(section(mesh, 2.0)) == 0
     assert np.isnan(wrap_line(mesh, 50.0, np.array([0.0, 2.0]))).all()

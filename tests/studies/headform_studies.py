@@ -90,7 +90,17 @@ DESIGNS = {
     "morris": "n = 16",
     "injury": "n = 60\nreplicate_size = 10",
     "model-comparison": "n = 60\nreplicate_size = 10",
+    "map": "n = 12\nreplicate_size = 4",
 }
+GRID = """
+[axes.impact_angle]
+unit = "deg"
+first = 0.0
+last = 10.0
+step = 5.0
+[axes.friction_body_car]
+values = [0.2, 0.25]
+"""
 # A hood of 1 kN/m times a scale: below SOFTEST the contact lasts more than a second and the run
 # fails, which one run in twenty does.
 SOFTEST = 0.0117
@@ -129,7 +139,13 @@ def study_text(
     text += f"\n[design]\n{design or DESIGNS[kind]}\n{inputs}{more}"
     if kind == "injury":
         return text + INJURY
-    extra = {"monte-carlo": "histories = 0", "model-comparison": ""}.get(kind, "resamples = 100")
+    if kind == "map":
+        text += GRID
+    extra = {
+        "monte-carlo": "histories = 0",
+        "model-comparison": "",
+        "map": "limits.hic15 = [250.0, 400.0]",
+    }.get(kind, "resamples = 100")
     listed = ", ".join(f'"{name}"' for name in outputs)
     return f"{text}\n[report]\noutputs = [{listed}]\n{extra}\n"
 

@@ -43,6 +43,7 @@ LARGER = {
     "morris": "n = 24",
     "injury": "n = 80\nreplicate_size = 10",
     "model-comparison": "n = 80\nreplicate_size = 10",
+    "map": "n = 20\nreplicate_size = 4",
 }
 FIGURES = {
     "monte-carlo": {"distributions", "rank_correlation", "convergence", "impact_speed"},
@@ -50,6 +51,7 @@ FIGURES = {
     "morris": {"mean_effects", "elementary_effects"},
     "injury": {"ais", "risk_hic15", "exceedance", "roc"},
     "model-comparison": {"variance", "pairs_soft_stiff", "breaking_soft_stiff", "along_soft_stiff"},
+    "map": {"map_hic15", "exceedance_hic15"},
 }
 SOFT = FAILING.replace("median = 8.4", "median = 2.0")
 """Hoods of which one in ten is too soft."""
@@ -367,9 +369,9 @@ def test_an_unfinished_folder_tells_to_go_on_or_reports_its_whole_parts(
     if kind in ("injury", "model-comparison"):
         assert "run the study again" in told(answer)
         return
-    wanted = {"monte-carlo": 119, "sobol": 50 // 6 * 6, "morris": 50 // 5 * 5}[kind]
+    wanted = {"monte-carlo": 119, "sobol": 50 // 6 * 6, "morris": 50 // 5 * 5, "map": 66}[kind]
     assert json.loads(answer.out)["analysis"]["runs"] == wanted
-    if kind != "monte-carlo":
+    if kind in ("sobol", "morris"):
         shutil.rmtree(folder.path)
         shutil.copytree(finished.path, folder.path)
         cut(folder, lambda runs: runs["run"] != 20)

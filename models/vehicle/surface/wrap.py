@@ -9,41 +9,69 @@ from models.vehicle.tape import tape_over
 Array = NDArray[np.float64]
 
 STRIP = 0.01
-"""Length (m) of the strips whose highest points are the upper side of a section."""
+"""Distance (m) of the places in which a section is seen."""
+_REARWARDS = np.array([-1.0, 1.0]) / 2.0**0.5
+_UPWARDS = np.array([1.0, 1.0]) / 2.0**0.5
+"""A front is seen from ahead and above, at 45 degrees: neither grille nor hood is seen edge-on."""
 
 
 def section(mesh: SurfaceMesh, y: float) -> Array:
-    """Return the points (k, 2), x and z in m, in which a plane of constant y cuts the edges."""
-    start, end = mesh.nodes[mesh.edges[:, 0]], mesh.nodes[mesh.edges[:, 1]]
-    before, after = start[:, 1] - y, end[:, 1] - y
-    cut = before * after <= 0.0
-    cut &= before != after
-    share = before[cut] / (before[cut] - after[cut])
-    points = start[cut] + share[:, None] * (end[cut] - start[cut])
-    return np.asarray(points[:, [0, 2]])
+    """Return the lines (k, 2, 2), ends by x and z in m, in which a plane of constant y cuts facets.
+
+    Parameters
+    ----------
+    mesh : SurfaceMesh
+    y : float
+        Lateral station, m.
+    """
+    away = mesh.corners[:, :, 1] - y
+    # A corner in the plane belongs to one side.
+    above = away > 0.0
+    cut = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
+    corners, away, above = mesh.corners[cut], away[cut], above[cut]
+    # The corner alone on its side of the plane, and the two others.
+    lone = np.where(above.sum(axis=1) == 1, np.argmax(above, axis=1), np.argmin(above, axis=1))
+    row = np.arange(len(cut))
+    ends = []
+    for step in (1, 2):
+        other = (lone + step) % 3
+        share = away[row, lone] / (away[row, lone] - away[row, other])
+        start = corners[row, lone]
+        ends.append(start + share[:, None] * (corners[row, other] - start))
+    return np.asarray(np.stack(ends, axis=1)[:, :, [0, 2]])
 
 
-def wrap_distance(points: Array, end: Array) -> float:
+def wrap_distance(lines: Array, end: Array) -> float:
     """Return the length (m) of a taut tape from the road to a point of a section.
 
     Parameters
     ----------
-    points : (n, 2) array
-        x and z of the section, m.
+    lines : (k, 2, 2) array
+        Of the section, m.
     end : (2,) array
-        Point of its upper side, m.
+        Point seen from ahead and above, m.
     """
+    points = lines.reshape(-1, 2)
     ahead = points[points[:, 0] > end[0]]
     path = tape_over(np.concatenate([ahead, end[None]]))
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
-def _upper_side(points: Array) -> Array:
-    """Return the highest point of a section in each strip, from the front rearwards."""
-    strip = np.floor(points[:, 0] / STRIP).astype(int)
-    order = np.lexsort((-points[:, 1], -strip))
-    first = np.concatenate([[True], np.diff(strip[order]) != 0])
-    return np.asarray(points[order][first])
+def _seen(lines: Array) -> Array:
+    """Return the points (n, 2) of a section that are seen from ahead and above, rearwards."""
+    along, height = lines @ _REARWARDS, lines @ _UPWARDS
+    order = np.argsort(along, axis=1)
+    start, end = np.take_along_axis(along, order, axis=1).T
+    low, high = np.take_along_axis(height, order, axis=1).T
+    places = np.arange(start.min() + 0.5 * STRIP, end.max(), STRIP)
+    inside = (start <= places[:, None]) & (places[:, None] <= end)
+    width = np.where(end > start, end - start, 1.0)
+    seen = low + (places[:, None] - start) / width * (high - low)
+    best = np.where(inside, seen, -np.inf).max(axis=1)
+    held = np.isfinite(best)
+    found = places[held, None] * _REARWARDS + best[held, None] * _UPWARDS
+    # Nothing below the foremost point is seen first.
+    return np.asarray(found[int(np.argmax(found[:, 0])) :])
 
 
 def wrap_line(mesh: SurfaceMesh, distance: float, stations: Array) -> Array:
@@ -64,20 +92,20 @@ def wrap_line(mesh: SurfaceMesh, distance: float, stations: Array) -> Array:
     """
     found = np.full((len(stations), 3), np.nan)
     for k, y in enumerate(stations):
-        points = section(mesh, float(y))
-        if len(points) < 3:
+        lines = section(mesh, float(y))
+        if len(lines) < 3:
             continue
-        side = _upper_side(points)
+        side = _seen(lines)
         low, high = 0, len(side) - 1
-        if wrap_distance(points, side[high]) < distance:
+        if not wrap_distance(lines, side[low]) <= distance <= wrap_distance(lines, side[high]):
             continue
         while high - low > 1:
             middle = (low + high) // 2
-            if wrap_distance(points, side[middle]) < distance:
+            if wrap_distance(lines, side[middle]) < distance:
                 low = middle
             else:
                 high = middle
-        before, after = (wrap_distance(points, side[place]) for place in (low, high))
+        before, after = (wrap_distance(lines, side[place]) for place in (low, high))
         share = (distance - before) / (after - before) if after > before else 1.0
         x, z = side[low] + min(max(share, 0.0), 1.0) * (side[high] - side[low])
         found[k] = (x, y, z)

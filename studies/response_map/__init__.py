@@ -1,0 +1,1 @@
+"""The map of outputs over two inputs."""

@@ -343,7 +343,8 @@ def effects(
 @app.command()
 def vehicle(
     mesh: Annotated[
-        str, typer.Argument(help="STL, PLY, OBJ or LS-DYNA file of a car, or a vehicle's name.")
+        str,
+        typer.Argument(help="STL, PLY, OBJ or LS-DYNA file, car file (TOML), or a vehicle's name."),
     ],
     out: Out = None,
     unit: Annotated[

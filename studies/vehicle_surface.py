@@ -12,7 +12,7 @@ from mcstudy.figures.surface import Facets, draw_surface
 from mcstudy.report import Table
 from mcstudy.text import number
 from models.vehicle.profile import vehicle_names
-from models.vehicle.surface.generator import generate_surface
+from models.vehicle.surface.car import load_car
 from models.vehicle.surface.mesh import SurfaceMesh
 from models.vehicle.surface.reader import read_surface
 from models.vehicle.surface.wrap import wrap_line
@@ -76,7 +76,7 @@ def understand_surface(source: str, unit: str = "m", lift: float = 0.0) -> Surfa
     Parameters
     ----------
     source : str
-        Path of a mesh, or name of a vehicle.
+        Path of a mesh or of a car file (``.toml``), or name of a vehicle.
     unit : str
         Unit of the mesh's coordinates.
     lift : float
@@ -87,14 +87,17 @@ def understand_surface(source: str, unit: str = "m", lift: float = 0.0) -> Surfa
     UserError
         If the mesh cannot be read, or is no car in this frame and unit.
     """
-    if source in vehicle_names():
-        mesh, notes = generate_surface(source), ["generated from the zones of the vehicle's file"]
-    else:
-        try:
+    try:
+        if source in vehicle_names():
+            mesh, notes = load_car(source).mesh, ["generated from the zones of the vehicle's file"]
+        elif source.endswith(".toml"):
+            car = load_car(source)
+            mesh, notes = car.mesh, [*car.notes, f"regions have the laws of {car.vehicle.name}"]
+        else:
             read = read_surface(Path(source), unit, lift)
-        except ValueError as error:
-            raise UserError(str(error)) from None
-        mesh, notes = read.mesh, read.notes
+            mesh, notes = read.mesh, read.notes
+    except ValueError as error:
+        raise UserError(str(error)) from None
     low, high = mesh.box[:, 1]
     stations = np.linspace(0.96 * low, 0.96 * high, STATIONS)
     lines = {f"WAD {d:g} m": wrap_line(mesh, d, stations) for d in DISTANCES}

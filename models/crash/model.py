@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from models.crash import outcome
 from models.crash.record import END_REASONS, Column, Frame, Summary
+from models.crash.scenario import Scenario
 from models.declaration import run_rows
 from models.effects.chain import build_chain
 from models.pedestrian.anthropometry import SEGMENTS, is_possible
@@ -150,6 +151,10 @@ class CrashModel(ABC):
         """Return the surfaces of facets for pictures, in the frames of their bodies."""
         return ()
 
+    def _tape(self, scenario: Scenario, zone: int, point: Array) -> outcome.Tape:
+        """Return what a tape on the car measures; see ``models.crash.outcome.tape_on_zones``."""
+        return outcome.tape_on_zones(scenario, zone, point)
+
     @abstractmethod
     def _step(self, values: dict[str, float]) -> outcome.Raw | None:
         """Return the raw results of the step loop, or None if the body never touches the car."""
@@ -204,7 +209,7 @@ class CrashModel(ABC):
         reason = END_REASONS[int(raw.summary[Summary.END_REASON])]
         if not reason.startswith("rest"):
             return reason, outputs
-        measures = outcome.measures(raw, signals)
+        measures = outcome.measures(raw, signals, self._tape)
         outputs |= {name: measures[name]() for name in outputs if name in measures}
         if math.isnan(measures["head_impact_time"]()):
             return NO_HEAD_CONTACT, outputs

@@ -174,8 +174,55 @@ class Signals:
         return filter_cfc(signal, SAMPLING_RATE, frequency_class, overwrite=True)
 
 
-def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
-    """Return the output evaluators, by name, of a run that came to rest."""
+@dataclass(frozen=True)
+class Tape:
+    """Distances measured with a tape on the car.
+
+    Attributes
+    ----------
+    wrap_around : float
+        Wrap-around distance of the head's first contact, m.
+    leading_edge : float
+        Wrap-around distance of the hood's leading edge, m.
+    """
+
+    wrap_around: float
+    leading_edge: float
+
+
+def tape_on_zones(scenario: Scenario, zone: int, point: Array) -> Tape:
+    """Return what a tape over the zones in side view measures.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    zone : int
+        Row of the zone that the head struck.
+    point : (3,) array
+        Deepest point of the head at first contact, frame of the diving car, m.
+    """
+    vehicle = scenario.vehicle
+    surface = surface_point(scenario.zones, zone, point[[0, 2]])
+    static = static_point(vehicle, scenario.dive_angle, surface)
+    return Tape(wrap_around_distance(vehicle.name, zone, static), hood_edge_distance(vehicle.name))
+
+
+Measured = Callable[[Scenario, int, Array], Tape]
+"""What measures distances on a car; see ``tape_on_zones``."""
+
+
+def measures(
+    raw: Raw, signals: Signals, measured: Measured = tape_on_zones
+) -> dict[str, Callable[[], float]]:
+    """Return the output evaluators, by name, of a run that came to rest.
+
+    Parameters
+    ----------
+    raw : Raw
+    signals : Signals
+    measured : callable
+        Measures distances on the car.
+    """
     record, time = raw.record, signals.time
     car = slice(0, signals.split)
     road = slice(signals.split, time.size)
@@ -229,11 +276,11 @@ def measures(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
         "crash_duration": lambda: float(raw.summary[Summary.TIME]),
         "car_stopping_distance": lambda: stopping_distance(raw.scenario.car_motion),
         "energy_residual": energy_residual,
-        **_head_contact(raw, signals),
+        **_head_contact(raw, signals, measured),
     }
 
 
-def _head_contact(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
+def _head_contact(raw: Raw, signals: Signals, measured: Measured) -> dict[str, Callable[[], float]]:
     """Return the output evaluators of the head's contact with the car; NaN if there was none."""
     contact = raw.head_contact
     zone = int(raw.summary[Summary.HEAD_REGION])
@@ -247,10 +294,8 @@ def _head_contact(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
     law = int(laws.surface_law[HEAD, zone])
 
     @functools.cache
-    def wad() -> float:
-        dive = raw.scenario.dive_angle
-        surface = surface_point(raw.scenario.zones, zone, point[[0, 2]])
-        return wrap_around_distance(vehicle.name, zone, static_point(vehicle, dive, surface))
+    def tape() -> Tape:
+        return measured(raw.scenario, zone, point)
 
     def mass() -> float:
         car = slice(0, signals.split)
@@ -266,8 +311,8 @@ def _head_contact(raw: Raw, signals: Signals) -> dict[str, Callable[[], float]]:
         "head_impact_speed": lambda: float(np.linalg.norm(velocity)),
         "head_impact_angle": lambda: impact_angle(velocity, normal),
         "effective_head_mass": mass,
-        "wad": wad,
-        "head_dent_distance": lambda: wad() - hood_edge_distance(vehicle.name),
+        "wad": lambda: tape().wrap_around,
+        "head_dent_distance": lambda: tape().wrap_around - tape().leading_edge,
         "head_fender_distance": lambda: vehicle.hood_side - abs(float(point[1])),
         "hood_intrusion": intrusion,
     }

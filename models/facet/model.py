@@ -4,21 +4,25 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models import data
 from models.crash.facet_front import FacetFront
 from models.crash.facet_survey import empty_findings
 from models.crash.model import TICK
-from models.crash.outcome import ANGULAR_CLASS, LINEAR_CLASS, Raw
+from models.crash.outcome import ANGULAR_CLASS, LINEAR_CLASS, Raw, Tape
 from models.crash.scenario import Scenario
 from models.effects.registry import effects_of
 from models.multibody.model import MultibodyModel
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
 from models.pedestrian.skin import FINE, SUBDIVISIONS, bare_skin, build_skin, segment_mesh
 from models.protocol import Mesh
-from models.vehicle.profile import dive_shift, diving_points
-from models.vehicle.surface.generator import generate_surface, laws_of_regions
-from models.vehicle.surface.store import load_field
+from models.vehicle.profile import dive_shift, diving_points, static_point
+from models.vehicle.surface.car import load_car
+from models.vehicle.surface.field import distances
+from models.vehicle.surface.wrap import leading_edge_distance, section, wrap_distance
+
+Array = NDArray[np.float64]
 
 CHILDREN = ("facets", "ellipsoids")
 """Surfaces of the child."""
@@ -36,6 +40,8 @@ class FacetModel(MultibodyModel):
 
     Parameters
     ----------
+    vehicle : str
+        Name of a vehicle of the data folder, or path of a car file (``.toml``) with a user's mesh.
     subdivisions : int
         Of the icosahedra that are the surface of the limbs: 2 gives 162 points a segment. Head and
         trunk have three at least, 642 points each.
@@ -48,7 +54,8 @@ class FacetModel(MultibodyModel):
     Raises
     ------
     ValueError
-        If an option is none of these, or the number of subdivisions is not within 1 to 4.
+        If an option is none of these, the car file is not valid, or the number of subdivisions is
+        not within 1 to 4.
     """
 
     name = "facet"
@@ -74,14 +81,17 @@ class FacetModel(MultibodyModel):
                 raise ValueError(f"{option} must be one of {', '.join(known)}, given {value!r}")
         if child == "ellipsoids" and load == "distributed":
             raise ValueError("load: ellipsoids have no points that share it; choose 'deepest'")
-        super().__init__(vehicle, tick, channel_class, angular_class, effects)
+        car = load_car(vehicle)
+        super().__init__(car.vehicle.name, tick, channel_class, angular_class, effects)
+        if car.digest:
+            self.version = f"{self.version}+{car.digest}"
         self._subdivisions = [int(subdivisions)] * len(SEGMENTS)
         for row in (HEAD, *TRUNK):
             self._subdivisions[row] = max(int(subdivisions), FINE)
         self._bare = child == "ellipsoids"
         self._distributed = np.array([float(load == "distributed")])
-        self.mesh = generate_surface(vehicle)
-        self._field = load_field(self.mesh, laws_of_regions(self.vehicle, self.mesh))
+        self.mesh = car.mesh
+        self._field = car.field()
         self._found = empty_findings(len(self.vehicle.zones))
 
     def front_of(self, scenario: Scenario) -> FacetFront:
@@ -98,6 +108,17 @@ class FacetModel(MultibodyModel):
             distributed=self._distributed,
             found=self._found,
         )
+
+    def _tape(self, scenario: Scenario, zone: int, point: Array) -> Tape:
+        """Return what a tape on the mesh measures, in the plane of the head's first contact."""
+        x, z = static_point(self.vehicle, scenario.dive_angle, point[[0, 2]])
+        place = np.array([[x, point[1], z]])
+        depth, gradient = distances(self._field, place)
+        surface = place[0] - depth[0] * gradient[0] / np.linalg.norm(gradient[0])
+        lines = section(self.mesh, float(surface[1]))
+        if not len(lines):
+            return Tape(math.nan, math.nan)
+        return Tape(wrap_distance(lines, surface[[0, 2]]), leading_edge_distance(lines))
 
     def _meshes(self, raw: Raw) -> list[Mesh]:
         """Return the diving car and, if it has facets, the child."""

@@ -32,10 +32,8 @@ from models.headform.target import (
 from models.multibody.tree import Motion, empty_loads, empty_motion
 from models.pedestrian.skin import FINE, Skin, build_skin
 from models.protocol import Input
-from models.vehicle.profile import load_vehicle
+from models.vehicle.surface.car import load_car
 from models.vehicle.surface.field import distances
-from models.vehicle.surface.generator import generate_surface, laws_of_regions
-from models.vehicle.surface.store import load_field
 from models.vehicle.surface.wrap import wrap_point
 
 Array = NDArray[np.float64]
@@ -81,12 +79,12 @@ class FacetTarget:
     skin : ForceCurve, optional
         The headform's skin; by default it is rigid.
     vehicle : str, optional
-        By default the family car.
+        Name of a vehicle, or path of a car file (``.toml``); by default the family car.
 
     Raises
     ------
     ValueError
-        If there is no such vehicle.
+        If there is no such vehicle, or the car file is not valid.
     """
 
     # A rigid surface has no mass of its own, and the laws of its zones no rate but their damping.
@@ -95,15 +93,14 @@ class FacetTarget:
         for name in effects_of("headform")
         if load_effect(name).stage != "contact" or name == "skin_compliance"
     )
-    digest = ""
 
     def __init__(
         self, nominal: Mapping[str, float], skin: ForceCurve | None, vehicle: str | None
     ) -> None:
         self._skin = skin
-        self.vehicle = load_vehicle(vehicle or "family_car_1990s")
-        self.mesh = generate_surface(self.vehicle.name)
-        self._field = load_field(self.mesh, laws_of_regions(self.vehicle, self.mesh))
+        car = load_car(vehicle or "family_car_1990s")
+        self.vehicle, self.mesh, self._field = car.vehicle, car.mesh, car.field()
+        self.digest = f"+{car.digest}" if car.digest else ""
         shared = {item.name: item for item in read_inputs(_TABLE)}
         items = [*(shared[name] for name in _SHARED), *read_inputs(_TABLE["facet"])]
         self.inputs: tuple[Input, ...] = tuple(

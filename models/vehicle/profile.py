@@ -10,14 +10,10 @@ from numpy.typing import NDArray
 
 from models import data
 from models.contact.corridor import Corridor, read_corridor
-from models.vehicle.tape import tape_over
+from models.vehicle.tape import EDGE_TANGENT, tape_over
 from models.vehicle.zones import MAXIMUM_DEPTH, PANEL, ROLL, Zones
 
 Array = NDArray[np.float64]
-
-EDGE_TANGENT = math.radians(40.0)
-"""Slope of the straight edge that marks the hood's leading edge: 50 deg from the vertical
-(EEVC WG17 bonnet leading edge reference line, recalled)."""
 
 
 @dataclass(frozen=True)

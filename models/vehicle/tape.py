@@ -7,6 +7,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+EDGE_TANGENT = math.radians(40.0)
+"""Slope of the straight edge that marks the hood's leading edge: 50 deg from the vertical
+(EEVC WG17 bonnet leading edge reference line, recalled)."""
+
 
 def tape_over(points: Array) -> Array:
     """Return the path (k, 2) of a taut tape from the road under the foremost point to the rearmost.

@@ -32,7 +32,10 @@ ROUNDS = 2
 
 
 def build_field(mesh: SurfaceMesh, regions: Index, spacing: float = SPACING) -> DistanceField:
-    """Return the signed distance field of a closed mesh.
+    """Return the signed distance field of a mesh.
+
+    An open mesh has an inside as well: what lies behind the facet, or the mean of the facets, at
+    the nearest point.
 
     Parameters
     ----------
@@ -45,9 +48,11 @@ def build_field(mesh: SurfaceMesh, regions: Index, spacing: float = SPACING) -> 
     Raises
     ------
     ValueError
-        If the mesh is not closed, or has no inside.
+        If facets side by side face opposite sides, or a closed mesh faces inwards.
     """
-    if not mesh.is_closed or mesh.volume <= 0.0:
+    if len(mesh.flipped_edges()) or len(mesh.crowded_edges()):
+        raise ValueError("a distance needs a mesh whose facets face the same side at every edge")
+    if mesh.is_closed and mesh.volume <= 0.0:
         raise ValueError("a distance needs a closed mesh whose facets face outwards")
     low, high = mesh.box
     origin = low - MARGIN * spacing

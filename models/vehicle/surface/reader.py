@@ -4,13 +4,15 @@ STL, PLY and OBJ are read by trimesh, LS-DYNA keyword shells by lsdyna-mesh-read
 states its unit.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from models.vehicle.surface.mesh import SurfaceMesh
 
@@ -26,6 +28,8 @@ CLEARANCE = (-0.02, 0.6)
 """Heights (m) between which the lowest point of a car lies above the road (assumed)."""
 KEYWORD = (".k", ".key", ".dyn")
 """Endings of LS-DYNA keyword files."""
+OPEN_ABOVE = 0.02
+"""Share of a mesh's area by which more of it faces down than up if it is open above (assumed)."""
 FORMATS = (".stl", ".ply", ".obj", *KEYWORD)
 
 
@@ -45,7 +49,9 @@ class ReadSurface:
     notes: list[str]
 
 
-def read_surface(path: Path, unit: str = "m", lift: float = 0.0) -> ReadSurface:
+def read_surface(
+    path: Path, unit: str = "m", lift: float = 0.0, more: Sequence[Path] = ()
+) -> ReadSurface:
     """Return a mesh of a car with x forward and z up, moved so that its foremost point is at x = 0.
 
     Regions are the parts of the file: shells by part, groups of an OBJ file, else one region.
@@ -58,26 +64,24 @@ def read_surface(path: Path, unit: str = "m", lift: float = 0.0) -> ReadSurface:
         Unit of its coordinates.
     lift : float
         Height to add, m.
+    more : sequence of Path
+        Further files of the same car, each one region.
 
     Raises
     ------
     ValueError
-        In one line, if the file cannot be read or the mesh is no car in this frame and unit.
+        In one line, if a file cannot be read or the mesh is no car in this frame and unit.
     """
     if unit not in UNITS:
         raise ValueError(f"unit must be one of {', '.join(UNITS)}, given {unit!r}")
-    ending = path.suffix.lower()
-    if ending not in FORMATS:
-        raise ValueError(f"{path}: has the ending {ending!r}; meshes end in {', '.join(FORMATS)}")
-    if not path.is_file():
-        raise ValueError(f"{path}: is no file")
-    raw = _read_keyword(path) if ending in KEYWORD else _read_mesh_file(path)
-    if not len(raw.facets):
-        raise ValueError(f"{path}: holds no facets")
-    lost = np.flatnonzero(~np.isfinite(raw.nodes).all(axis=1))
-    if lost.size:
-        raise ValueError(
-            f"{path}: {lost.size} nodes have no finite place, the first is node {lost[0]}"
+    raw = _read_file(path)
+    for other in more:
+        part = _read_file(other)
+        raw = SurfaceMesh(
+            np.concatenate([raw.nodes, part.nodes]),
+            np.concatenate([raw.facets, part.facets + len(raw.nodes)]),
+            np.concatenate([raw.region, np.full(len(part.facets), len(raw.names))]),
+            (*raw.names, other.stem),
         )
     _check_size(path, raw, unit)
     scaled = replace(raw, nodes=raw.nodes * UNITS[unit])
@@ -99,6 +103,24 @@ def read_surface(path: Path, unit: str = "m", lift: float = 0.0) -> ReadSurface:
     mesh = _face_outwards(path, mesh, notes)
     _check_placing(path, mesh)
     return ReadSurface(mesh, notes)
+
+
+def _read_file(path: Path) -> SurfaceMesh:
+    """Return the mesh of a file in its own unit."""
+    ending = path.suffix.lower()
+    if ending not in FORMATS:
+        raise ValueError(f"{path}: has the ending {ending!r}; meshes end in {', '.join(FORMATS)}")
+    if not path.is_file():
+        raise ValueError(f"{path}: is no file")
+    raw = _read_keyword(path) if ending in KEYWORD else _read_mesh_file(path)
+    if not len(raw.facets):
+        raise ValueError(f"{path}: holds no facets")
+    lost = np.flatnonzero(~np.isfinite(raw.nodes).all(axis=1))
+    if lost.size:
+        raise ValueError(
+            f"{path}: {lost.size} nodes have no finite place, the first is node {lost[0]}"
+        )
+    return raw
 
 
 def _place(point: Array) -> str:
@@ -213,7 +235,7 @@ def _check_placing(path: Path, mesh: SurfaceMesh) -> None:
 
     if mesh.is_closed and reach(0.0, 0.15) < 0.8 * reach(0.85, 1.0):
         raise ValueError(f"{path}: is shorter below than above; it stands upside down")
-    if not mesh.is_closed and mesh.area_vectors[:, 2].sum() < 0.0:
+    if not mesh.is_closed and mesh.area_vectors[:, 2].sum() < -OPEN_ABOVE * mesh.areas.sum():
         raise ValueError(f"{path}: is open above; it stands upside down")
 
     def top(first: float, last: float) -> float:
@@ -245,12 +267,12 @@ def _face_outwards(path: Path, mesh: SurfaceMesh, notes: list[str]) -> SurfaceMe
             f"{path}: {len(crowded):,} edges have three facets or more, the first at "
             f"{_place(where)}; leave the inner sheets out"
         )
-    outward = np.einsum(
-        "ij,ij->", mesh.corners.mean(axis=1) - mesh.box.mean(axis=0), mesh.area_vectors
-    )
-    if outward < 0.0:
-        notes.append("all facets faced inwards and are turned")
-        mesh = replace(mesh, facets=mesh.facets[:, ::-1].copy())
+    inward = _facing_inwards(mesh)
+    if inward.any():
+        told = "all facets" if inward.all() else f"{int(inward.sum()):,} facets of single sheets"
+        notes.append(f"{told} faced inwards and are turned")
+        facets = np.where(inward[:, None], mesh.facets[:, ::-1], mesh.facets)
+        mesh = replace(mesh, facets=facets)
     gaps = mesh.open_edges()
     if len(gaps):
         ends = mesh.nodes[gaps]
@@ -258,6 +280,33 @@ def _face_outwards(path: Path, mesh: SurfaceMesh, notes: list[str]) -> SurfaceMe
         where = ends.mean(axis=1)[np.argmax(ends.mean(axis=1)[:, 0])]
         notes.append(
             f"the surface is open: {len(gaps):,} edges, {total:.2f} m in all, the foremost at "
-            f"{_place(where)}"
+            f"{_place(where)}; beyond an open edge the inside is what lies behind the last facet"
         )
     return mesh
+
+
+def _facing_inwards(mesh: SurfaceMesh) -> NDArray[np.bool_]:
+    """Return which facets (m,) belong to a sheet, connected by its edges, that faces inwards."""
+    ordered = np.sort(mesh.edges, axis=1)
+    _, edge = np.unique(ordered, axis=0, return_inverse=True)
+    facet = np.repeat(np.arange(len(mesh.facets)), 3)
+    count = len(mesh.facets)
+    links = coo_array(
+        (np.ones(len(facet)), (facet, count + edge.reshape(-1))),
+        shape=(count + int(edge.max()) + 1,) * 2,
+    )
+    _, sheet = connected_components(links, directed=False)
+    # Outwards is away from the car's middle axis.
+    low, high = mesh.box
+    middle = mesh.corners.mean(axis=1)
+    axis = np.stack(
+        [
+            np.clip(middle[:, 0], *(low[0] + share * (high[0] - low[0]) for share in (0.25, 0.75))),
+            np.zeros(count),
+            np.full(count, low[2] + 0.4 * (high[2] - low[2])),
+        ],
+        axis=1,
+    )
+    outward = np.einsum("ij,ij->i", middle - axis, mesh.area_vectors)
+    total = np.bincount(sheet[:count], weights=outward)
+    return np.asarray(total[sheet[:count]] < 0.0)

@@ -31,7 +31,7 @@ def load_field(
     Raises
     ------
     ValueError
-        If the mesh is not closed.
+        If the mesh has no inside; see ``build_field``.
     """
     file = _file_of(mesh, regions, spacing)
     if file is not None:

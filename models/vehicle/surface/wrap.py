@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.vehicle.surface.mesh import SurfaceMesh
-from models.vehicle.tape import tape_over
+from models.vehicle.tape import EDGE_TANGENT, tape_over
 
 Array = NDArray[np.float64]
 
@@ -55,6 +55,27 @@ def wrap_distance(lines: Array, end: Array) -> float:
     ahead = points[points[:, 0] > end[0]]
     path = tape_over(np.concatenate([ahead, end[None]]))
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+
+
+def leading_edge_distance(lines: Array) -> float:
+    """Return the wrap-around distance (m) of the hood's leading edge line on a section.
+
+    Parameters
+    ----------
+    lines : (k, 2, 2) array
+        Of the section, m.
+    """
+    path = tape_over(lines.reshape(-1, 2))
+    step = np.diff(path, axis=0)
+    length = np.linalg.norm(step, axis=1)
+    # The slope changes from line to line: it is taken at their middles.
+    slope = np.arctan2(step[:, 1], -step[:, 0])
+    middle = np.cumsum(length) - 0.5 * length
+    first = int(np.argmax(slope <= EDGE_TANGENT))
+    if first == 0:
+        return float(middle[0])
+    pair = [first - 1, first]
+    return float(np.interp(-EDGE_TANGENT, -slope[pair], middle[pair]))
 
 
 def _seen(lines: Array) -> Array:

@@ -19,6 +19,7 @@ def main() -> None:
     injuries = run_study("configs/paper_injury.toml", quiet=False)
     population = run_study("configs/population_injury.toml", quiet=False)
     methods = run_study("configs/model_comparison.toml", quiet=False)
+    hood_map = run_study("configs/hood_map.toml", quiet=False)
     hood = ResultsFolder("results/stiffness_hood_tests")
     fit_stiffness_of(Path("configs/hood_tests"), hood)
     validation = ResultsFolder("results/validation_throw")
@@ -34,6 +35,7 @@ def main() -> None:
         for name in names:
             shutil.copyfile(folder.path / "figures" / name, GALLERY / name)
     shutil.copyfile(population.path / "figures" / "ais.png", GALLERY / "population_ais.png")
+    shutil.copyfile(hood_map.path / "figures" / "map_hic15.png", GALLERY / "hood_map.png")
     shutil.copyfile(methods.path / "figures" / "variance.png", GALLERY / "method_variance.png")
     shutil.copyfile(validation.path / "figures" / "throw_1.png", GALLERY / "validation_throw.png")
 

@@ -16,6 +16,7 @@ from models.crash.front import (
     patch_count,
     ploughing_of,
     pressure_point,
+    reach_of,
     react,
     separation_of,
     survey,
@@ -94,7 +95,7 @@ def apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, po
         wx, wy = contacts.centre[i, 0] - car[0], contacts.centre[i, 1] - car[1]
         cx, cy = cosine * wx + sine * wy, -sine * wx + cosine * wy
         cz = contacts.centre[i, 2]
-        reach = ellipsoids.reach[i]
+        reach = reach_of(front, ellipsoids, i)
         for j in range(count):
             contacts.segment_force[i, j] = 0.0
         # The loads before the zones are subtracted here, those after them are added below.

@@ -121,6 +121,12 @@ def _rotation_of(front, motion, i, cosine, sine, M):
 
 
 @inlined_kernel
+def facet_reach(front, ellipsoids, i):
+    """Return the largest distance (m) of a segment's surface from its ellipsoid's centre."""
+    return front.skin.reach[i]
+
+
+@inlined_kernel
 def facet_survey(front, ellipsoids, motion, i, cx, cy, cz, cosine, sine):
     """Find pressure, direction and depth of a segment in every region.
 
@@ -147,7 +153,7 @@ def facet_survey(front, ellipsoids, motion, i, cx, cy, cz, cosine, sine):
     nearest, gx, gy, gz = distance_at(field, x, y, z)
     # The distance is exact on the grid's nodes only.
     spare = 0.5 * field.spacing[0]
-    if nearest > ellipsoids.reach[i] + spare:
+    if nearest > skin.reach[i] + spare:
         return
     for j in range(regions):
         found.pressure[j] = 0.0

@@ -23,13 +23,14 @@ class Answers(NamedTuple):
 
     Attributes
     ----------
-    patch_count, survey, may_touch, is_near, separation_of : callable
+    patch_count, reach_of, survey, may_touch, is_near, separation_of : callable
         Compiled functions.
     pressure_point, are_joined, friction_of, ploughing_of, react : callable
         Compiled functions.
     """
 
     patch_count: Callable[..., Any]
+    reach_of: Callable[..., Any]
     survey: Callable[..., Any]
     may_touch: Callable[..., Any]
     is_near: Callable[..., Any]
@@ -44,6 +45,7 @@ class Answers(NamedTuple):
 FRONTS: dict[type, Answers] = {
     Zones: Answers(
         patch_count=zone_front.zone_count,
+        reach_of=zone_front.zone_reach,
         survey=zone_front.zone_survey,
         may_touch=zone_front.zone_may_touch,
         is_near=zone_front.zone_is_near,
@@ -56,6 +58,7 @@ FRONTS: dict[type, Answers] = {
     ),
     FacetFront: Answers(
         patch_count=facet_front.facet_count,
+        reach_of=facet_survey.facet_reach,
         survey=facet_survey.facet_survey,
         may_touch=facet_front.facet_may_touch,
         is_near=facet_front.facet_is_near,
@@ -88,6 +91,11 @@ def _answered(question):
 @_answered
 def patch_count(front):
     """Return the number of patches of a front."""
+
+
+@_answered
+def reach_of(front, ellipsoids, segment):
+    """Return the largest distance (m) of a segment's surface from its ellipsoid's centre."""
 
 
 @_answered

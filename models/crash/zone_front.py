@@ -24,6 +24,12 @@ def zone_count(zones):
 
 
 @inlined_kernel
+def zone_reach(zones, ellipsoids, i):
+    """Return the largest semi-axis (m) of a segment."""
+    return ellipsoids.reach[i]
+
+
+@inlined_kernel
 def zone_survey(zones, ellipsoids, motion, i, cx, cy, cz, cosine, sine):
     """Do nothing: every zone is asked for itself.
 

@@ -14,8 +14,17 @@ from models.crash.outcome import ANGULAR_CLASS, LINEAR_CLASS, Raw, Tape
 from models.crash.scenario import Scenario
 from models.effects.registry import effects_of
 from models.multibody.model import MultibodyModel
-from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK
-from models.pedestrian.skin import FINE, SUBDIVISIONS, bare_skin, build_skin, segment_mesh
+from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK, Body
+from models.pedestrian.body_mesh import load_body_meshes
+from models.pedestrian.skin import (
+    FINE,
+    SUBDIVISIONS,
+    Skin,
+    bare_skin,
+    build_skin,
+    joint_caps,
+    segment_mesh,
+)
 from models.protocol import Mesh
 from models.vehicle.profile import dive_shift, diving_points, static_point
 from models.vehicle.surface.car import load_car
@@ -47,6 +56,8 @@ class FacetModel(MultibodyModel):
         trunk have three at least, 642 points each.
     child : str
         ``facets``, or ``ellipsoids`` as in the multibody model.
+    body : str
+        Path of a body file (``.toml``) with meshes of the user's own for some or all segments.
     load : str
         ``distributed`` over the points inside the car, or carried by the ``deepest`` one, as in the
         multibody model.
@@ -54,8 +65,8 @@ class FacetModel(MultibodyModel):
     Raises
     ------
     ValueError
-        If an option is none of these, the car file is not valid, or the number of subdivisions is
-        not within 1 to 4.
+        If an option is none of these, the car or body file is not valid, or the number of
+        subdivisions is not within 1 to 4.
     """
 
     name = "facet"
@@ -68,6 +79,7 @@ class FacetModel(MultibodyModel):
         vehicle: str = "family_car_1990s",
         subdivisions: int = SUBDIVISIONS,
         child: str = "facets",
+        body: str = "",
         load: str = "distributed",
         tick: float = TICK,
         channel_class: float = LINEAR_CLASS,
@@ -81,10 +93,13 @@ class FacetModel(MultibodyModel):
                 raise ValueError(f"{option} must be one of {', '.join(known)}, given {value!r}")
         if child == "ellipsoids" and load == "distributed":
             raise ValueError("load: ellipsoids have no points that share it; choose 'deepest'")
+        if body and child == "ellipsoids":
+            raise ValueError("body: its meshes are facets; choose child 'facets'")
         car = load_car(vehicle)
         super().__init__(car.vehicle.name, tick, channel_class, angular_class, effects)
-        if car.digest:
-            self.version = f"{self.version}+{car.digest}"
+        self._own = load_body_meshes(body) if body else None
+        own = [car.digest, self._own.digest if self._own else ""]
+        self.version = "+".join([self.version, *(digest for digest in own if digest)])
         self._subdivisions = [int(subdivisions)] * len(SEGMENTS)
         for row in (HEAD, *TRUNK):
             self._subdivisions[row] = max(int(subdivisions), FINE)
@@ -102,12 +117,21 @@ class FacetModel(MultibodyModel):
             dive=np.array([math.cos(dive), math.sin(dive), *dive_shift(self.vehicle, dive)]),
             friction=scenario.zones.friction,
             ploughing=scenario.zones.ploughing,
-            skin=bare_skin(len(SEGMENTS))
-            if self._bare
-            else build_skin(scenario.body.semi_axes, self._subdivisions),
+            skin=self._skin(scenario.body),
             distributed=self._distributed,
             found=self._found,
         )
+
+    def _skin(self, body: Body) -> Skin:
+        """Return the surface of a body."""
+        if self._bare:
+            return bare_skin(body.semi_axes)
+        if self._own is None:
+            return build_skin(body.semi_axes, self._subdivisions, caps=joint_caps(body))
+        shapes = self._own.shapes_of(body)
+        # The joints of a user's mesh are its own.
+        caps = {row: cap for row, cap in joint_caps(body).items() if row not in shapes}
+        return build_skin(body.semi_axes, self._subdivisions, shapes, caps)
 
     def _tape(self, scenario: Scenario, zone: int, point: Array) -> Tape:
         """Return what a tape on the mesh measures, in the plane of the head's first contact."""
@@ -126,8 +150,11 @@ class FacetModel(MultibodyModel):
         car[:, [0, 2]] = diving_points(self.vehicle, raw.scenario.dive_angle, car[:, [0, 2]])
         found = [Mesh("car", car, self.mesh.facets, "car")]
         if not self._bare:
-            found += [
-                Mesh(name, *segment_mesh(raw.scenario.body, k), name)
-                for k, name in enumerate(SEGMENTS)
-            ]
+            body = raw.scenario.body
+            shapes = self._own.shapes_of(body) if self._own else {}
+            for k, name in enumerate(SEGMENTS):
+                if k in shapes:
+                    found.append(Mesh(name, shapes[k].nodes, shapes[k].facets, name))
+                else:
+                    found.append(Mesh(name, *segment_mesh(body, k), name))
         return found

@@ -74,9 +74,9 @@ def read_surface(
     """
     if unit not in UNITS:
         raise ValueError(f"unit must be one of {', '.join(UNITS)}, given {unit!r}")
-    raw = _read_file(path)
+    raw = read_mesh(path)
     for other in more:
-        part = _read_file(other)
+        part = read_mesh(other)
         raw = SurfaceMesh(
             np.concatenate([raw.nodes, part.nodes]),
             np.concatenate([raw.facets, part.facets + len(raw.nodes)]),
@@ -105,8 +105,14 @@ def read_surface(
     return ReadSurface(mesh, notes)
 
 
-def _read_file(path: Path) -> SurfaceMesh:
-    """Return the mesh of a file in its own unit."""
+def read_mesh(path: Path) -> SurfaceMesh:
+    """Return the mesh of a file in its own unit.
+
+    Raises
+    ------
+    ValueError
+        In one line, if the file cannot be read.
+    """
     ending = path.suffix.lower()
     if ending not in FORMATS:
         raise ValueError(f"{path}: has the ending {ending!r}; meshes end in {', '.join(FORMATS)}")

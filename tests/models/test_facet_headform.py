@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from models.headform.facet_target import FacetTarget
@@ -65,6 +65,7 @@ def test_left_and_right_of_the_car_are_alike() -> None:
         assert left["hic15"] == pytest.approx(right["hic15"], rel=0.03), (wad, y)
 
 
+@settings(deadline=None)
 @given(PLACES, st.floats(20.0, 90.0), st.floats(3.0, 13.0))
 def test_a_headform_anywhere_loses_its_energy_to_the_contact_alone(
     place: tuple[float, float], elevation: float, speed: float

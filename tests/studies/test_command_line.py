@@ -40,7 +40,7 @@ def test_an_interrupt_is_told_and_the_same_command_resumes(tmp_path: Path) -> No
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
-    until = time.monotonic() + 120.0
+    until = time.monotonic() + 300.0
     while not list(out.glob("parts/*.parquet")) and time.monotonic() < until:
         time.sleep(0.1)
     process.send_signal(signal.SIGINT)

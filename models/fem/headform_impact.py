@@ -33,19 +33,9 @@ STICKING = 0.2
 """Largest share of a node's momentum along the sheet that friction takes in a step (assumed): keeps
 a light node from being thrown back and forth."""
 
-# Places of the energy balance (J).
-(
-    KINETIC,
-    SECTION,
-    SHEAR,
-    HOURGLASS,
-    DRILL,
-    PARTS,
-    SKIN,
-    FRICTION,
-    HEADFORM,
-) = range(9)
-BALANCE = 9
+# Places of the energy balance (J); the last is the sum of the elements' four.
+KINETIC, SECTION, SHEAR, BOW, DRILL, PARTS, SKIN, FRICTION, HEADFORM, INTERNAL = range(10)
+BALANCE = 10
 
 
 @inlined_kernel
@@ -127,7 +117,7 @@ def press_sphere(
 def strike_shells(
     nodes, shells, materials, start, ties, gaps, supports, touched, foundation, friction,
     mass, inertia, radius, centre, velocity, spin, axes, step, stride, least,
-    load, frame, local, record, balance, summary,
+    load, frame, local, record, balance, summary, lowest,
 ):  # fmt: skip
     """Step from first contact until the headform has left the sheet.
 
@@ -163,6 +153,8 @@ def strike_shells(
         Filled, as in ``models.headform.facet_impact``; penetration is the headform's own travel.
     balance : (BALANCE,) array
         Filled: energy by place, J.
+    lowest : (2,) array
+        Filled: largest displacement of a node against the normal and its time, m and s.
     summary : (SUMMARY,) array
         Filled; END_TIME is NaN if the record is full before the contact ends.
     """
@@ -180,6 +172,14 @@ def strike_shells(
             load,
         )  # fmt: skip
         slid += step * power
+        if k % stride == 0:
+            for i in range(touched.shape[0]):
+                n = touched[i]
+                moved = 0.0
+                for a in range(3):
+                    moved -= axes[0, a] * (nodes.position[n, a] - start[n, a])
+                if moved > lowest[0]:
+                    lowest[0], lowest[1] = moved, k * step
         touching = load[6] != 0.0 or load[7] != 0.0 or load[8] != 0.0
         free = 0.0 if touching else free + step
         if touching:
@@ -230,6 +230,45 @@ def strike_shells(
     balance[SKIN] = skin
     balance[FRICTION] = slid
     balance[HEADFORM] = 0.5 * mass * square + 0.5 * inertia * summary[END_SPIN] ** 2
+    balance[INTERNAL] = shells.energy.sum()
     summary[ABSORBED] = 0.0
     for j in range(HEADFORM):
         summary[ABSORBED] += balance[j]
+
+
+@kernel
+def settle(
+    nodes, shells, materials, start, ties, gaps, supports, step, count, damping, frame, local
+):  # fmt: skip
+    """Let a mesh come to rest by damping in proportion to mass.
+
+    Parameters
+    ----------
+    nodes, shells, materials
+        The mesh; changed.
+    start : (n, 3) array
+        Places of the nodes at rest, m.
+    ties, gaps, supports
+        See ``models.fem.parts``.
+    step : float
+        s.
+    count : int
+        Number of steps.
+    damping : float
+        Force against the velocity over mass, 1/s.
+    frame : (3, 3) array
+        Workspace.
+    local : (9,) array
+        Workspace.
+    """
+    keep = 1.0 - damping * step
+    for _ in range(count):
+        clear_loads(nodes)
+        for e in range(shells.node.shape[0]):
+            update_element(nodes, shells, materials, e, step, frame, local)
+        apply_parts(nodes, start, ties, gaps, supports)
+        for n in range(nodes.mass.shape[0]):
+            for a in range(3):
+                nodes.velocity[n, a] *= keep
+                nodes.spin[n, a] *= keep
+        advance(nodes, step, step)

@@ -47,6 +47,8 @@ class Strike:
         Components of the force on the headform, the first along the initial normal, N.
     dent : tuple of float
         Largest and permanent penetration of the surface, m.
+    doubtful : bool
+        Whether the mesh was too coarse for what happened.
     """
 
     speeds: tuple[float, float]
@@ -54,6 +56,7 @@ class Strike:
     summary: Array
     force: Array
     dent: tuple[float, float]
+    doubtful: bool = False
 
 
 class Target(Protocol):

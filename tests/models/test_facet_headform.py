@@ -115,7 +115,7 @@ def test_fender_and_softer_hood_act_where_they_are() -> None:
 
 def test_effects_that_a_rigid_surface_cannot_have_are_refused() -> None:
     options = {"surface": "facet"}
-    with pytest.raises(ValueError, match="'hood_inertia' applies to surface 'zone' only"):
+    with pytest.raises(ValueError, match="'hood_inertia' does not apply to surface 'facet'"):
         load_model("headform", options, {"hood_inertia": {}})
     base = load_model("headform", options).run({}).outputs
     for effect, values in {
@@ -131,7 +131,7 @@ def test_effects_that_a_rigid_surface_cannot_have_are_refused() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"surface": "water"}, "surface must be one of zone, facet"),
+        ({"surface": "water"}, "surface must be one of zone, facet, fem"),
         ({"surface": "facet", "corridor": "working_curves"}, "takes the curves of a vehicle"),
         ({"surface": "facet", "vehicle": "tank"}, "no vehicle 'tank'"),
     ],

@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install study diagnose-demo case test test-slow check benchmark gallery calibrate lock clean
+.PHONY: help install study diagnose-demo case test test-slow check benchmark gallery calibrate headform-chain lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 24
@@ -48,6 +48,9 @@ gallery: install  ## remake the pictures of the README from the real study
 
 calibrate: install  ## calibrate to the case's tables again and print the values
 	$(BIN)/python -m scripts.paper_calibration
+
+headform-chain: install  ## the headform test on finite elements, its fitted curve in the other models
+	$(BIN)/python -m scripts.headform_chain
 
 lock: install  ## lock the newest versions that pyproject.toml allows
 	$(BIN)/python -m pip install --quiet uv

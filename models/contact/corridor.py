@@ -84,6 +84,29 @@ class Corridor:
         return half(self.lower), half(self.upper)
 
 
+def read_curve(knots: Any, unloading_ratio: float, damping: float = 0.0) -> ForceCurve:
+    """Return a loading curve from its knots.
+
+    Parameters
+    ----------
+    knots : sequence of pairs
+        Penetration (m) and force (N), from (0, 0).
+    unloading_ratio : float
+        Unloading slope over secant slope.
+    damping : float
+        N s/m.
+
+    Raises
+    ------
+    ValueError
+        If these are no pairs, or no loading curve.
+    """
+    table = np.array(knots, dtype=np.float64)
+    if table.ndim != 2 or table.shape[1] != 2:
+        raise ValueError("must be a list of pairs [penetration m, force N]")
+    return ForceCurve(table[:, 0].copy(), table[:, 1].copy(), unloading_ratio, damping)
+
+
 def read_corridor(row: Mapping[str, Any]) -> Corridor:
     """Return the corridor of a table of a data file.
 
@@ -101,14 +124,8 @@ def read_corridor(row: Mapping[str, Any]) -> Corridor:
 
     def curve(key: str) -> ForceCurve:
         try:
-            knots = np.array(row[key], dtype=np.float64)
-            if knots.ndim != 2 or knots.shape[1] != 2:
-                raise ValueError("must be a list of pairs [penetration m, force N]")
-            return ForceCurve(
-                knots[:, 0].copy(),
-                knots[:, 1].copy(),
-                float(row["unloading_ratio"]),
-                float(row.get("damping", 0.0)),
+            return read_curve(
+                row[key], float(row["unloading_ratio"]), float(row.get("damping", 0.0))
             )
         except KeyError as error:
             raise ValueError(f"corridor: {error.args[0]} is missing") from None

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from models.crash import outcome
 from models.crash.record import END_REASONS, Column, Frame, Summary
-from models.crash.scenario import Scenario
+from models.crash.scenario import HOOD, Scenario
 from models.declaration import run_rows
 from models.effects.chain import build_chain
 from models.pedestrian.anthropometry import SEGMENTS, is_possible
@@ -49,12 +49,14 @@ class CrashModel(ABC):
     effects : mapping, optional
         Parameter values of each effect that is switched on, by effect; those left out take the
         median of their prior.
+    hood_curve : sequence of pairs, optional
+        Knots (penetration m, force N) of the hood's loading curve, in place of its corridor.
 
     Raises
     ------
     ValueError
-        If the vehicle or an effect is unknown, the step is not within 1 us to 0.2 ms, or a channel
-        frequency class is too high for the sampling rate of 10 kHz.
+        If the vehicle or an effect is unknown, the curve is none, the step is not within 1 us to
+        0.2 ms, or a channel frequency class is too high for the sampling rate of 10 kHz.
     """
 
     name: str
@@ -75,6 +77,7 @@ class CrashModel(ABC):
         channel_class: float = outcome.LINEAR_CLASS,
         angular_class: float = outcome.ANGULAR_CLASS,
         effects: Mapping[str, Mapping[str, float]] | None = None,
+        hood_curve: Sequence[Sequence[float]] | None = None,
     ) -> None:
         if not 1e-6 <= float(tick) <= 2e-4:
             raise ValueError(f"tick must lie within 1e-6 and 2e-4 s, given {tick}")
@@ -85,6 +88,8 @@ class CrashModel(ABC):
                     f"{option} must lie within 0 and {outcome.HIGHEST_CLASS:g}, given {value}"
                 )
         self.vehicle: Vehicle = load_vehicle(vehicle)
+        if hood_curve is not None:
+            self.vehicle = self.vehicle.with_curve(HOOD, hood_curve)
         self.tick = float(tick)
         self._chain = build_chain(self.name, effects)
         n, zones = len(SEGMENTS), len(self.vehicle.zones)

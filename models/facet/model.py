@@ -1,7 +1,7 @@
 """The facet crash model behind the model protocol."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,7 @@ class FacetModel(MultibodyModel):
         channel_class: float = LINEAR_CLASS,
         angular_class: float = ANGULAR_CLASS,
         effects: Mapping[str, Mapping[str, float]] | None = None,
+        hood_curve: Sequence[Sequence[float]] | None = None,
     ) -> None:
         if not 1 <= subdivisions <= 4:
             raise ValueError(f"subdivisions must lie within 1 and 4, given {subdivisions}")
@@ -96,7 +97,7 @@ class FacetModel(MultibodyModel):
         if body and child == "ellipsoids":
             raise ValueError("body: its meshes are facets; choose child 'facets'")
         car = load_car(vehicle)
-        super().__init__(car.vehicle.name, tick, channel_class, angular_class, effects)
+        super().__init__(car.vehicle.name, tick, channel_class, angular_class, effects, hood_curve)
         self._own = load_body_meshes(body) if body else None
         own = [car.digest, self._own.digest if self._own else ""]
         self.version = "+".join([self.version, *(digest for digest in own if digest)])

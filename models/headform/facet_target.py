@@ -2,7 +2,7 @@
 
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -80,6 +80,8 @@ class FacetTarget:
         The headform's skin; by default it is rigid.
     vehicle : str, optional
         Name of a vehicle, or path of a car file (``.toml``); by default the family car.
+    hood_curve : sequence of pairs, optional
+        Knots (penetration m, force N) of the hood's loading curve, in place of its corridor.
 
     Raises
     ------
@@ -95,11 +97,17 @@ class FacetTarget:
     )
 
     def __init__(
-        self, nominal: Mapping[str, float], skin: ForceCurve | None, vehicle: str | None
+        self,
+        nominal: Mapping[str, float],
+        skin: ForceCurve | None,
+        vehicle: str | None,
+        hood_curve: Sequence[Sequence[float]] | None = None,
     ) -> None:
         self._skin = skin
         car = load_car(vehicle or "family_car_1990s")
         self.vehicle, self.mesh, self._field = car.vehicle, car.mesh, car.field()
+        if hood_curve is not None:
+            self.vehicle = self.vehicle.with_curve(HOOD, hood_curve)
         self.digest = f"+{car.digest}" if car.digest else ""
         shared = {item.name: item for item in read_inputs(_TABLE)}
         items = [*(shared[name] for name in _SHARED), *read_inputs(_TABLE["facet"])]

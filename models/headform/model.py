@@ -61,7 +61,7 @@ class HeadformModel:
         inertia.
     hood_curve : sequence of pairs, optional
         Knots (penetration m, force N) from (0, 0), extrapolated linearly; the input
-        ``hood_stiffness`` does not exist then.
+        ``hood_stiffness`` does not exist then. On facets it replaces the hood's corridor.
     corridor : str, optional
         Name of a corridor of the data folder, or path of a corridor file (``.toml``).
     vehicle : str, optional
@@ -112,7 +112,8 @@ class HeadformModel:
             raise ValueError(
                 f"no headform {headform!r}: choose one of {', '.join(headform_names())}"
             )
-        if sum(option is not None for option in (hood_curve, corridor, vehicle)) > 1:
+        given = [hood_curve, corridor] if surface == "facet" else [hood_curve, corridor, vehicle]
+        if sum(option is not None for option in given) > 1:
             raise ValueError("give one of hood_curve, corridor and vehicle, not several")
         if skin not in ("rigid", "vinyl"):
             raise ValueError(f"skin must be 'rigid' or 'vinyl', given {skin!r}")
@@ -127,12 +128,11 @@ class HeadformModel:
         own = vinyl_skin() if skin == "vinyl" else None
         self.target: Target
         if surface == "facet":
-            if hood_curve is not None or corridor is not None:
+            if corridor is not None:
                 raise ValueError(
-                    "surface 'facet' takes the curves of a vehicle: leave hood_curve and corridor "
-                    "out, or write a vehicle file"
+                    "surface 'facet' takes the curves of a vehicle: leave corridor out"
                 )
-            self.target = FacetTarget(nominal, own, vehicle)
+            self.target = FacetTarget(nominal, own, vehicle, hood_curve)
         elif surface == "fem":
             if hood_curve is not None or corridor is not None or skin != "rigid":
                 raise ValueError(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models import data
-from models.contact.corridor import Corridor, load_corridors
+from models.contact.corridor import Corridor, load_corridors, read_curve
 from models.contact.headform import HeadformContact
 from models.contact.law import (
     DAMPING_ONSET,
@@ -171,10 +171,7 @@ class ZoneTarget:
 
 def _curve_of(knots: Sequence[Sequence[float]]) -> ForceCurve:
     try:
-        table = np.array(knots, dtype=np.float64)
-        if table.ndim != 2 or table.shape[1] != 2:
-            raise ValueError("must be a list of pairs [penetration m, force N]")
-        return ForceCurve(table[:, 0].copy(), table[:, 1].copy(), 2.0)
+        return read_curve(knots, 2.0)
     except (ValueError, TypeError) as error:
         raise ValueError(f"hood_curve: {error}") from None
 

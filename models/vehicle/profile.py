@@ -3,13 +3,13 @@
 import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models import data
-from models.contact.corridor import Corridor, read_corridor
+from models.contact.corridor import Corridor, read_corridor, read_curve
 from models.vehicle.tape import EDGE_TANGENT, tape_over
 from models.vehicle.zones import MAXIMUM_DEPTH, PANEL, ROLL, Zones
 
@@ -99,6 +99,36 @@ class Vehicle:
             friction=np.zeros(len(zones)),
             ploughing=np.array([z.ploughing for z in zones]),
         )
+
+    def with_curve(self, name: str, knots: Sequence[Sequence[float]]) -> "Vehicle":
+        """Return the vehicle with one loading curve in place of a zone's corridor.
+
+        Unloading and damping stay those of the corridor's median.
+
+        Parameters
+        ----------
+        name : str
+            Name of the zone.
+        knots : sequence of pairs
+            Penetration (m) and force (N), from (0, 0).
+
+        Raises
+        ------
+        ValueError
+            If there is no such zone, or the knots are no loading curve.
+        """
+        row = self.zone_index(name)
+        if row < 0:
+            known = ", ".join(zone.name for zone in self.zones)
+            raise ValueError(f"vehicle {self.name!r} has no zone {name!r}; it has {known}")
+        median = self.zones[row].corridor.median
+        try:
+            curve = read_curve(knots, median.unloading_ratio, median.damping)
+        except (ValueError, TypeError) as error:
+            raise ValueError(f"curve of the {name}: {error}") from None
+        zones = list(self.zones)
+        zones[row] = replace(zones[row], corridor=Corridor(curve, curve, curve))
+        return replace(self, zones=tuple(zones))
 
     def zone_index(self, name: str) -> int:
         """Return the row of a zone, or -1 if the car has no zone of that name."""

@@ -12,8 +12,9 @@ from models.contact.law import ForceCurve
 from models.declaration import read_inputs
 from models.effects.chain import EffectChain
 from models.effects.registry import effects_of, load_effect
-from models.fem.explicit import areas, build_shells, stable_step
-from models.fem.headform_impact import (
+from models.headform.facet_impact import FORCE
+from models.headform.impact import END_TIME, NORMAL, SAMPLES, SUMMARY, Impactor
+from models.headform.shell_impact import (
     BALANCE,
     BOW,
     FEM_COLUMNS,
@@ -21,12 +22,11 @@ from models.fem.headform_impact import (
     settle,
     strike_shells,
 )
-from models.fem.hood_mesh import OUTER, HoodMesh, build_hood, hood_table
-from models.fem.shells import Shells
-from models.headform.facet_impact import FORCE
-from models.headform.impact import END_TIME, NORMAL, SAMPLES, SUMMARY, Impactor
 from models.headform.target import SAMPLING_RATE, Strike
 from models.protocol import Input
+from models.shells.explicit import areas, build_shells, stable_step
+from models.shells.hood_mesh import OUTER, HoodMesh, build_hood, hood_table
+from models.shells.state import Shells
 from models.vehicle.profile import load_vehicle
 from models.vehicle.surface.generator import generate_surface
 from models.vehicle.surface.wrap import wrap_point

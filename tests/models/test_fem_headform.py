@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.fem.explicit import build_shells, stable_step
-from models.fem.hood_mesh import INNER, OUTER, build_hood
 from models.protocol import Model
 from models.registry import load_model
+from models.shells.explicit import build_shells, stable_step
+from models.shells.hood_mesh import INNER, OUTER, build_hood
 from models.vehicle.profile import load_vehicle
 from models.vehicle.surface.car import load_car
 from models.vehicle.surface.field import distances

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from scipy.linalg import eigh
 
 from models.compilation import kernel
-from models.fem.explicit import build_shells, internal_forces, run_free, stable_step
-from models.fem.material import Materials, flow_stress, return_to_yield
-from models.fem.shells import Nodes, Shells
+from models.shells.explicit import build_shells, internal_forces, run_free, stable_step
+from models.shells.material import Materials, flow_stress, return_to_yield
+from models.shells.state import Nodes, Shells
 
 STEEL = {"young": 210e9, "poisson": 0.3, "density": 7850.0}
 CURVE = Path(__file__).parent / "data" / "curved_plate_calculix.csv"

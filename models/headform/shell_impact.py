@@ -8,9 +8,6 @@ import math
 
 from models.compilation import inlined_kernel, kernel
 from models.contact.friction import SLIP_VELOCITY
-from models.fem.element import update_element
-from models.fem.explicit import advance, clear_loads
-from models.fem.parts import apply_parts
 from models.headform.facet_impact import FACET_COLUMNS, FORCE
 from models.headform.impact import (
     ABSORBED,
@@ -27,6 +24,9 @@ from models.headform.impact import (
     SPIN,
     TANGENTIAL,
 )
+from models.shells.element import update_element
+from models.shells.explicit import advance, clear_loads
+from models.shells.parts import apply_parts
 
 FEM_COLUMNS = FACET_COLUMNS
 STICKING = 0.2
@@ -128,7 +128,7 @@ def strike_shells(
     start : (n, 3) array
         Places of the nodes at rest, m.
     ties, gaps, supports
-        See ``models.fem.parts``.
+        See ``models.shells.parts``.
     touched, foundation, friction
         See ``press_sphere``.
     mass, inertia, radius : float
@@ -249,7 +249,7 @@ def settle(
     start : (n, 3) array
         Places of the nodes at rest, m.
     ties, gaps, supports
-        See ``models.fem.parts``.
+        See ``models.shells.parts``.
     step : float
         s.
     count : int

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models import data
-from models.fem.material import Materials
-from models.fem.parts import Gaps, Supports, Ties
+from models.shells.material import Materials
+from models.shells.parts import Gaps, Supports, Ties
 from models.vehicle.profile import Vehicle
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ class HoodMesh:
     normal : (3,) array
         Outward normal of the hood's plane.
     ties, gaps, supports
-        See ``models.fem.parts``.
+        See ``models.shells.parts``.
     """
 
     position: Array

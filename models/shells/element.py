@@ -18,8 +18,8 @@ ties the rotation about the normal to that of the element.
 import math
 
 from models.compilation import inlined_kernel
-from models.fem.material import return_to_yield, static_yield
-from models.fem.shells import WORK_BOW, WORK_DRILL, WORK_SECTION, WORK_SHEAR
+from models.shells.material import return_to_yield, static_yield
+from models.shells.state import WORK_BOW, WORK_DRILL, WORK_SECTION, WORK_SHEAR
 
 SHEAR_FACTOR = 5.0 / 6.0
 """Transverse shear stiffness of a homogeneous section over G h (E. Reissner)."""

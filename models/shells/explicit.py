@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.compilation import inlined_kernel, kernel
-from models.fem.element import place_element, update_element
-from models.fem.material import Materials
-from models.fem.shells import GAUSS, Nodes, Shells
+from models.shells.element import place_element, update_element
+from models.shells.material import Materials
+from models.shells.state import GAUSS, Nodes, Shells
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

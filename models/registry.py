@@ -10,6 +10,7 @@ from models.protocol import Model
 # name: module and factory, imported on request.
 _MODELS = {
     "facet": ("models.facet.model", "FacetModel"),
+    "fem": ("models.fem.model", "FemModel"),
     "headform": ("models.headform.model", "HeadformModel"),
     "multibody": ("models.multibody.model", "MultibodyModel"),
     "planar": ("models.planar.model", "PlanarModel"),

@@ -21,7 +21,7 @@ FAR = 50.0
 @kernel
 def _press(front, ellipsoids, car, motion, loads, contacts, tree, power):
     update_surfaces(ellipsoids, motion, contacts)
-    apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, power)
+    apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, power, 0.0)
 
 
 def force_along(crash: Crash, front: Any, segment: int, places: Array) -> Array:

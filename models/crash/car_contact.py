@@ -11,10 +11,12 @@ from models.contact.dent import ploughing_coefficient, pressure_share
 from models.contact.friction import friction_coefficient
 from models.crash.front import (
     are_joined,
+    carry,
     friction_of,
     may_touch,
     patch_count,
     ploughing_of,
+    prepare,
     pressure_point,
     reach_of,
     react,
@@ -67,7 +69,7 @@ def _plough(
 
 
 @inlined_kernel
-def apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, power):
+def apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, power, time):
     """Add the loads of the car on all segments, and the reactions on its front.
 
     Parameters
@@ -88,9 +90,12 @@ def apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, po
         Gives the segments' masses.
     power : (channels,) array
         Power (W) on the body by work channel; increased in place.
+    time : float
+        s; a front with a state of its own advances to it.
     """
     cosine, sine = math.cos(car[2]), math.sin(car[2])
     count = patch_count(front)
+    prepare(front, ellipsoids, car, cosine, sine, motion, contacts, time)
     for i in range(tree.mass.shape[0]):
         wx, wy = contacts.centre[i, 0] - car[0], contacts.centre[i, 1] - car[1]
         cx, cy = cosine * wx + sine * wy, -sine * wx + cosine * wy
@@ -176,6 +181,7 @@ def apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, po
             contacts.normal[i, j, 0] = nx
             contacts.normal[i, j, 1] = ny
             contacts.normal[i, j, 2] = nz
+        carry(front, car, cosine, sine, motion, loads, contacts, power, i)
         for k in range(3):
             contacts.car_force[i, k] += loads.force[i, k]
 

@@ -60,7 +60,7 @@ def facet_count(front):
 
 
 @inlined_kernel
-def _vector_to_car(front, x, y, z):
+def vector_to_car(front, x, y, z):
     """Return a vector of the static car's frame in that of the diving car."""
     c, s = front.dive[0], front.dive[1]
     return c * x + s * z, y, -s * x + c * z
@@ -69,7 +69,7 @@ def _vector_to_car(front, x, y, z):
 @inlined_kernel
 def _to_car(front, x, y, z):
     """Return a point of the static car's frame in that of the diving car."""
-    tx, ty, tz = _vector_to_car(front, x, y, z)
+    tx, ty, tz = vector_to_car(front, x, y, z)
     return tx + front.dive[2], ty, tz + front.dive[3]
 
 
@@ -170,7 +170,7 @@ def facet_separation(front, ellipsoids, contacts, j, i, cx, cy, cz, cosine, sine
     found = front.found
     if found.share[j] <= 0.0:
         return 1.0, 1.0, 0.0, 0.0, cx, cy, cz, 0.0, j
-    nx, ny, nz = _vector_to_car(
+    nx, ny, nz = vector_to_car(
         front, found.direction[j, 0], found.direction[j, 1], found.direction[j, 2]
     )
     # The point of the ellipsoid that is foremost against that direction.
@@ -212,7 +212,7 @@ def facet_pressure_point(front, j, share, flesh, px, py, pz, cx, cy, cz):
     if front.distributed[0] != 1.0:
         return px + share * (cx - px), py + share * (cy - py), pz + share * (cz - pz)
     x, y, z = _to_car(front, found.mean[j, 0], found.mean[j, 1], found.mean[j, 2])
-    nx, ny, nz = _vector_to_car(
+    nx, ny, nz = vector_to_car(
         front, found.direction[j, 0], found.direction[j, 1], found.direction[j, 2]
     )
     lift = CAP * flesh

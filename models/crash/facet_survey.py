@@ -111,7 +111,7 @@ def _carry(front, x, y, z, depth, gx, gy, gz):
 
 
 @inlined_kernel
-def _rotation_of(front, motion, i, cosine, sine, M):
+def rotation_of(front, motion, i, cosine, sine, M):
     """Fill the rotation (3, 3) from a segment's axes to the static car's frame."""
     c, s = front.dive[0], front.dive[1]
     for k in range(3):
@@ -163,7 +163,7 @@ def facet_survey(front, ellipsoids, motion, i, cx, cy, cz, cosine, sine):
             found.direction[j, k] = 0.0
             found.mean[j, k] = 0.0
     M = found.turn
-    _rotation_of(front, motion, i, cosine, sine, M)
+    rotation_of(front, motion, i, cosine, sine, M)
     least, lx, ly, lz = 1.0, gx, gy, gz
     dx, dy, dz = x, y, z
     shared = front.distributed[0] == 1.0

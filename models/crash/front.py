@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 from numba.extending import overload
 
 from models.compilation import MERGED_FLAGS
-from models.crash import facet_front, facet_survey, zone_front
+from models.crash import facet_front, facet_survey, sheet_front, zone_front
 from models.crash.facet_front import FacetFront
+from models.crash.sheet_front import SheetFront
 from models.vehicle.zones import Zones
 
 
@@ -23,12 +24,14 @@ class Answers(NamedTuple):
 
     Attributes
     ----------
-    patch_count, reach_of, survey, may_touch, is_near, separation_of : callable
+    prepare, carry, patch_count, reach_of, survey, may_touch, is_near, separation_of : callable
         Compiled functions.
     pressure_point, are_joined, friction_of, ploughing_of, react : callable
         Compiled functions.
     """
 
+    prepare: Callable[..., Any]
+    carry: Callable[..., Any]
     patch_count: Callable[..., Any]
     reach_of: Callable[..., Any]
     survey: Callable[..., Any]
@@ -44,6 +47,8 @@ class Answers(NamedTuple):
 
 FRONTS: dict[type, Answers] = {
     Zones: Answers(
+        prepare=zone_front.nothing_to_prepare,
+        carry=zone_front.nothing_to_carry,
         patch_count=zone_front.zone_count,
         reach_of=zone_front.zone_reach,
         survey=zone_front.zone_survey,
@@ -57,6 +62,8 @@ FRONTS: dict[type, Answers] = {
         react=zone_front.zone_reaction,
     ),
     FacetFront: Answers(
+        prepare=zone_front.nothing_to_prepare,
+        carry=zone_front.nothing_to_carry,
         patch_count=facet_front.facet_count,
         reach_of=facet_survey.facet_reach,
         survey=facet_survey.facet_survey,
@@ -70,7 +77,12 @@ FRONTS: dict[type, Answers] = {
         react=facet_front.facet_reaction,
     ),
 }
-"""Functions of each front geometry, by its type."""
+FRONTS[SheetFront] = FRONTS[FacetFront]._replace(
+    prepare=sheet_front.sheet_prepare,
+    carry=sheet_front.sheet_carry,
+    may_touch=sheet_front.sheet_may_touch,
+)
+"""Functions of each front geometry, by its type; a sheet answers as facets but for its own."""
 
 
 def _answered(question):
@@ -86,6 +98,54 @@ def _answered(question):
         return lambda front, *rest: answer(front, *rest)
 
     return stub
+
+
+@_answered
+def prepare(front, ellipsoids, car, cosine, sine, motion, contacts, time):
+    """Advance a front with a state of its own to a time.
+
+    Parameters
+    ----------
+    front : named tuple
+        Geometry of the car's front; its state is changed.
+    ellipsoids : Ellipsoids
+        Surfaces of the segments and their contact laws.
+    car : (6,) array
+        x, y (m) and yaw (rad) of the car's frame and their rates.
+    cosine, sine : float
+        Of the car's yaw.
+    motion : Motion
+        Positions and velocities of the segments.
+    contacts : Contacts
+        Centres of the ellipsoids.
+    time : float
+        s.
+    """
+
+
+@_answered
+def carry(front, car, cosine, sine, motion, loads, contacts, power, segment):
+    """Add to a segment the loads of a front with a state of its own.
+
+    Parameters
+    ----------
+    front : named tuple
+        Geometry of the car's front.
+    car : (6,) array
+        x, y (m) and yaw (rad) of the car's frame and their rates.
+    cosine, sine : float
+        Of the car's yaw.
+    motion : Motion
+        Positions and velocities of the segments.
+    loads : Loads
+        Increased in place.
+    contacts : Contacts
+        Forces, points and normals are set.
+    power : (channels,) array
+        Power (W) on the body by work channel; increased in place.
+    segment : int
+        Row of the segment.
+    """
 
 
 @_answered

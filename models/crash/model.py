@@ -156,6 +156,10 @@ class CrashModel(ABC):
         """Return the surfaces of facets for pictures, in the frames of their bodies."""
         return ()
 
+    def _more_measures(self, raw: outcome.Raw) -> dict[str, Callable[[], float]]:
+        """Return the evaluators of outputs that a model adds or replaces."""
+        return {}
+
     def _tape(self, scenario: Scenario, zone: int, point: Array) -> outcome.Tape:
         """Return what a tape on the car measures; see ``models.crash.outcome.tape_on_zones``."""
         return outcome.tape_on_zones(scenario, zone, point)
@@ -214,7 +218,7 @@ class CrashModel(ABC):
         reason = END_REASONS[int(raw.summary[Summary.END_REASON])]
         if not reason.startswith("rest"):
             return reason, outputs
-        measures = outcome.measures(raw, signals, self._tape)
+        measures = outcome.measures(raw, signals, self._tape) | self._more_measures(raw)
         outputs |= {name: measures[name]() for name in outputs if name in measures}
         if math.isnan(measures["head_impact_time"]()):
             return NO_HEAD_CONTACT, outputs

@@ -18,6 +18,18 @@ ARC_BORDER = 0.15
 
 
 @inlined_kernel
+def nothing_to_prepare(front, ellipsoids, car, cosine, sine, motion, contacts, time):
+    """Do nothing: the front has no state of its own; see ``models.crash.front.prepare``."""
+    return
+
+
+@inlined_kernel
+def nothing_to_carry(front, car, cosine, sine, motion, loads, contacts, power, i):
+    """Do nothing: the front has no state of its own; see ``models.crash.front.carry``."""
+    return
+
+
+@inlined_kernel
 def zone_count(zones):
     """Return the number of patches."""
     return zones.radius.shape[0]

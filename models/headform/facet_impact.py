@@ -107,7 +107,7 @@ def strike_facets(
         for a in range(3):
             loads.force[0, a] = 0.0
             loads.torque[0, a] = 0.0
-        apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, sphere, power)
+        apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, sphere, power, k * step)
         now = 0.0
         for a in range(3):
             if k > 0:

@@ -190,7 +190,7 @@ class FacetTarget:
         contact = chain.act("contact", HeadformContact(values["friction_body_car"], 0.0, 0.0),
                             values)  # fmt: skip
         skin = skin_of(self._skin, contact.skin_compliance, max(float(c.force[-1]) for c in curves))
-        ellipsoids = _sphere(impactor.radius, curves, skin)
+        ellipsoids = sphere(impactor.radius, curves, skin)
         stiffest = max(stiffest_slope(c.penetration, c.force, c.unloading_ratio) for c in curves)
         stride = steps_per_sample(stiffest, max(c.damping for c in curves), impactor.mass)
         regions = len(curves)
@@ -200,7 +200,7 @@ class FacetTarget:
         strike_facets(
             self._front(contact.friction, values["ploughing"], impactor.radius), ellipsoids,
             Sphere(np.array([impactor.mass]), np.array([impactor.inertia])),
-            _moving(centre, velocity), empty_loads(1), contacts, np.zeros(CHANNELS),
+            moving(centre, velocity), empty_loads(1), contacts, np.zeros(CHANNELS),
             np.zeros((2, 3)), np.zeros(6), axes, 1.0 / (SAMPLING_RATE * stride), stride,
             record, summary,
         )  # fmt: skip
@@ -251,19 +251,26 @@ class FacetTarget:
             dive=np.array([1.0, 0.0, 0.0, 0.0]),
             friction=np.full(regions, friction),
             ploughing=ploughing * shares,
-            skin=_sphere_skin(radius),
+            skin=sphere_skin(radius),
             distributed=np.ones(1),
             found=empty_findings(regions),
         )
 
 
 @functools.lru_cache(maxsize=64)
-def _sphere_skin(radius: float) -> Skin:
+def sphere_skin(radius: float) -> Skin:
+    """Return the surface points of a sphere of a radius in m."""
     return build_skin(np.full((1, 3), radius), [FINE])
 
 
-def _moving(centre: Array, velocity: Array) -> Motion:
-    """Return the motion of one body without rotation."""
+def moving(centre: Array, velocity: Array) -> Motion:
+    """Return the motion of one body without rotation.
+
+    Parameters
+    ----------
+    centre, velocity : (3,) array
+        m and m/s.
+    """
     motion = empty_motion(1)
     motion.centre[0] = centre
     motion.velocity[0] = velocity
@@ -271,8 +278,18 @@ def _moving(centre: Array, velocity: Array) -> Motion:
     return motion
 
 
-def _sphere(radius: float, curves: list[ForceCurve], skin: ForceCurve | None) -> Ellipsoids:
-    """Return one sphere and its laws against the zones."""
+def sphere(radius: float, curves: list[ForceCurve], skin: ForceCurve | None) -> Ellipsoids:
+    """Return one sphere and its laws against the zones.
+
+    Parameters
+    ----------
+    radius : float
+        m.
+    curves : list of ForceCurve
+        Loading curves of the zones, in order.
+    skin : ForceCurve, optional
+        The sphere's skin; by default it is rigid.
+    """
     laws = np.zeros((len(curves), KNOTS, 4))
     counts = [write_law(curve, skin, law) for curve, law in zip(curves, laws, strict=True)]
     return Ellipsoids(

@@ -19,13 +19,13 @@ from models.headform.shell_impact import (
     BOW,
     FEM_COLUMNS,
     INTERNAL,
-    settle,
     strike_shells,
 )
 from models.headform.target import SAMPLING_RATE, Strike
 from models.protocol import Input
 from models.shells.explicit import areas, build_shells, stable_step
 from models.shells.hood_mesh import OUTER, HoodMesh, build_hood, hood_table
+from models.shells.settling import settle
 from models.shells.state import Shells
 from models.vehicle.profile import load_vehicle
 from models.vehicle.surface.generator import generate_surface

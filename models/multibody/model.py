@@ -37,6 +37,7 @@ class MultibodyModel(CrashModel):
     channels = read_channels(_TABLE)
     isomme_device = str(_TABLE["isomme_device"])
     cost = float(_TABLE["cost"])
+    coarse = COARSE
 
     def _step(self, values: dict[str, float]) -> outcome.Raw | None:
         crash = build_crash(values, self.vehicle, self._chain, self.front_of)
@@ -65,7 +66,7 @@ class MultibodyModel(CrashModel):
             record = np.empty((int(TIME_LIMIT / tick) + 2, record.shape[1]))
         settings = Settings(
             tick=tick,
-            coarse=stable_ticks(rate, tick, COARSE),
+            coarse=stable_ticks(rate, tick, self.coarse),
             slide=stable_ticks(rate, tick, SLIDE),
             flight=stable_ticks(rate, tick, FLIGHT),
             time_limit=TIME_LIMIT,

@@ -212,7 +212,7 @@ def total_energy(tree, motion, road):
 
 
 @inlined_kernel
-def evaluate(model, data):
+def evaluate(model, data, time):
     """Compute loads, accelerations and the power (W) of all channels for the present state."""
     tree, motion, loads, contacts = model.tree, data.motion, data.loads, data.contacts
     power, road = data.power, model.road
@@ -232,7 +232,7 @@ def evaluate(model, data):
     apply_joint_torques(tree, model.joints, motion, loads, power)
     apply_bushings(tree, model.joints, motion, loads, power)
     apply_car_contacts(
-        model.front, model.ellipsoids, data.car, motion, loads, contacts, tree, power
+        model.front, model.ellipsoids, data.car, motion, loads, contacts, tree, power, time
     )
     apply_road_contacts(model.ellipsoids, road, motion, loads, contacts, tree, power)
     apply_self_contacts(model.ellipsoids, motion, loads, contacts, tree, power)
@@ -257,7 +257,7 @@ def step(model, data, time, length):
         data.old_power[k] = data.power[k]
     predict(model.tree, data.motion, data.loads, data.memory, length)
     car_state(model.car_motion, time, data.car)
-    evaluate(model, data)
+    evaluate(model, data, time)
     correct(model.tree, data.motion, data.loads, data.memory, length)
     for k in range(CHANNELS):
         data.work[k] += 0.5 * length * (data.old_power[k] + data.power[k])
@@ -341,7 +341,7 @@ def simulate(model, data):
     summary, head = data.summary, settings.head
     time, quiet = 0.0, 0.0
     car_state(model.car_motion, time, data.car)
-    evaluate(model, data)
+    evaluate(model, data, time)
     summary[Summary.ENERGY_AT_START] = total_energy(tree, motion, model.road)
     summary[Summary.GROUND_TIME] = math.inf
     summary[Summary.HEAD_REGION] = -1.0

@@ -297,7 +297,7 @@ def _apply_loads(model, data, ahead):
         for k in range(3):
             loads.force[i, k] = 0.0
             loads.torque[i, k] = 0.0
-    apply_car_contacts(model.front, ellipsoids, data.car, motion, loads, contacts, body, power)
+    apply_car_contacts(model.front, ellipsoids, data.car, motion, loads, contacts, body, power, 0.0)
     apply_self_contacts(ellipsoids, motion, loads, contacts, body, power)
     for i in range(n):
         given[i, FORCE_X], given[i, FORCE_Z] = loads.force[i, 0], loads.force[i, 2]

@@ -1,0 +1,271 @@
+"""The finite-element crash model behind the model protocol."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models import data
+from models.crash.facet_survey import empty_findings
+from models.crash.model import TICK
+from models.crash.outcome import ANGULAR_CLASS, LINEAR_CLASS, Raw
+from models.crash.record import Column, HeadContact
+from models.crash.scenario import HOOD, Scenario
+from models.crash.sheet import MOVING, PARTS, RUNNING, WORK, Sheet
+from models.crash.sheet_front import SheetFront
+from models.declaration import read_inputs, read_outputs
+from models.effects.registry import effects_of, load_effect
+from models.facet.model import FacetModel
+from models.multibody.model import MultibodyModel
+from models.pedestrian.anthropometry import HEAD, SEGMENTS, Body
+from models.pedestrian.tissue import build_tissue
+from models.protocol import Input, Mesh
+from models.shells.explicit import areas, build_shells, stable_step
+from models.shells.hood_mesh import OUTER, HoodMesh, build_hood, hood_table
+from models.shells.settling import settle
+from models.vehicle.profile import Vehicle, dive_shift, diving_points, static_point
+from models.vehicle.surface.generator import laws_of_regions
+from models.vehicle.surface.mesh import SurfaceMesh
+from models.vehicle.surface.store import load_field
+
+Array = NDArray[np.float64]
+
+SIZE = 0.02
+"""Default size of the elements, m."""
+ABOVE = 0.3
+"""Height (m) of the space above the hood in which bodies wake the sheet."""
+SETTLING, DAMPING = 0.012, 600.0
+"""Time (s) and damping (1/s) in which the hood comes to rest after the crash."""
+AROUND = 0.15
+"""Distance (m) of a dent from the head's contact up to which it is the head's (assumed)."""
+
+_TABLE = data.load("fem.toml")
+_MORE = read_inputs(data.load("headform.toml")["fem"])
+
+
+class FemModel(FacetModel):
+    """The facet model with a hood of finite elements, coupled to the body at every step of it.
+
+    See ``CrashModel`` for the other parameters.
+
+    Parameters
+    ----------
+    vehicle : str
+        Name of a vehicle that has a hood of finite elements.
+    element_size : float
+        Size of the elements, m.
+
+    Raises
+    ------
+    ValueError
+        If the vehicle has no finite elements, or the size is not within 8 to 60 mm.
+    """
+
+    name = "fem"
+    version = f"{FacetModel.version}.{_TABLE['version']}"
+    cost = float(_TABLE["cost"])
+    effects: tuple[str, ...] = tuple(
+        name for name in effects_of("fem") if load_effect(name).stage != "curve"
+    )
+    outputs = MultibodyModel.outputs + read_outputs(_TABLE)
+    _own_inputs: tuple[Input, ...] = (
+        *(
+            replace(item, ignored=_TABLE["ignored"].get(item.name, ""))
+            for item in MultibodyModel._own_inputs
+        ),
+        *_MORE,
+    )
+    coarse = int(_TABLE["coarse"])
+
+    def __init__(
+        self,
+        vehicle: str = "family_car_1990s",
+        element_size: float = SIZE,
+        tick: float = TICK,
+        channel_class: float = LINEAR_CLASS,
+        angular_class: float = ANGULAR_CLASS,
+        effects: Mapping[str, Mapping[str, float]] | None = None,
+    ) -> None:
+        if not 0.008 <= float(element_size) <= 0.06:
+            raise ValueError(f"element_size must lie within 0.008 and 0.06 m, given {element_size}")
+        table = hood_table(vehicle)
+        super().__init__(
+            vehicle, tick=tick, channel_class=channel_class, angular_class=angular_class,
+            effects=effects,
+        )  # fmt: skip
+        self.size = float(element_size)
+        self.version = f"{self.version}.{table['version']}"
+        mesh = with_whole_hood(self.vehicle, self.mesh, table["hood"]["half_width"])
+        self._field = load_field(mesh, laws_of_regions(self.vehicle, mesh))
+        self._values: Mapping[str, float] = {}
+        self._sheet: Sheet | None = None
+        self._hood: HoodMesh | None = None
+
+    def _step(self, values: dict[str, float]) -> Raw | None:
+        self._values = values
+        return super()._step(values)
+
+    def front_of(self, scenario: Scenario) -> Any:
+        """Return the front of a scenario: facets, and the sheet in place of the hood."""
+        values = self._values
+        self._hood = hood = build_hood(
+            self.vehicle, self.size, rib=values["rib_depth"], sheet=values["sheet_thickness"],
+            strength=values["yield_stress"],
+        )  # fmt: skip
+        self._sheet = build_sheet(
+            hood,
+            head_foundation(scenario.body, values["head_stiffness"]),
+            float(_TABLE["relaxation"]),
+        )
+        dive = scenario.dive_angle
+        return SheetFront(
+            field=self._field,
+            dive=np.array([math.cos(dive), math.sin(dive), *dive_shift(self.vehicle, dive)]),
+            friction=scenario.zones.friction,
+            ploughing=scenario.zones.ploughing,
+            skin=self._skin(scenario.body),
+            distributed=self._distributed,
+            found=empty_findings(len(self.vehicle.zones)),
+            sheet=self._sheet,
+            row=np.array([self.vehicle.zone_index(HOOD)]),
+            spins=np.zeros((len(SEGMENTS), 3)),
+        )
+
+    def _more_measures(self, raw: Raw) -> dict[str, Callable[[], float]]:
+        """Return the evaluators of the outputs that the sheet gives."""
+        sheet, hood = self._sheet, self._hood
+        assert sheet is not None
+        assert hood is not None
+        account = sheet.account
+        booked = float(sheet.shells.energy.sum() + account[MOVING] + account[PARTS])
+        work = float(account[WORK])
+        residual = (work - booked) / work if work > 0.0 else 0.0
+        step = sheet.step
+        count = round(SETTLING / step) if sheet.clock[RUNNING] > 0.0 else 0
+        settle(
+            sheet.nodes, sheet.shells, sheet.materials, sheet.start, sheet.ties, sheet.gaps,
+            sheet.supports, step, count, DAMPING,
+            sheet.frame, sheet.local,
+        )  # fmt: skip
+        contact = raw.head_contact[HeadContact.POINT : HeadContact.POINT + 3]
+        found = {
+            "permanent_dent": math.nan, "dent_behind_edge": math.nan, "hood_intrusion": math.nan,
+        }  # fmt: skip
+        if math.isfinite(raw.head_contact[HeadContact.TIME]):
+            x, z = static_point(self.vehicle, raw.scenario.dive_angle, contact[[0, 2]])
+            place = np.array([x, contact[1], z])
+            own = np.linalg.norm(sheet.start[sheet.touched] - place, axis=1) < AROUND
+            moved = (sheet.start - sheet.nodes.position)[sheet.touched] @ sheet.normal
+            dent = np.where(own, moved, -math.inf)
+            deepest = int(np.argmax(dent))
+            found = {
+                "permanent_dent": float(max(dent[deepest], 0.0)) if own.any() else 0.0,
+                "dent_behind_edge": float(hood.plan[sheet.touched[deepest], 0]),
+                "hood_intrusion": float(sheet.lowest[own].max()) if own.any() else 0.0,
+            }
+        force = raw.record[:, Column.HEAD_CAR_FORCE]
+        return {name: (lambda v=value: v) for name, value in found.items()} | {
+            "head_contact_force": lambda: float(force.max()),
+            "hood_energy_residual": lambda: residual,
+        }
+
+    def _meshes(self, raw: Raw) -> list[Mesh]:
+        """Return the car without its hood, the dented hood, and the child."""
+        found = super()._meshes(raw)
+        sheet, hood = self._sheet, self._hood
+        assert sheet is not None
+        assert hood is not None
+        kept = self._is_body(hood)
+        car = found[0]
+        found[0] = Mesh("car", car.nodes, car.faces[kept], "car")
+        outer = hood.elements[(hood.sheet[hood.elements] == OUTER).all(axis=1)]
+        nodes = sheet.nodes.position.copy()
+        nodes[:, [0, 2]] = diving_points(self.vehicle, raw.scenario.dive_angle, nodes[:, [0, 2]])
+        return [*found, Mesh("hood", nodes, outer, "car")]
+
+    def _is_body(self, hood: HoodMesh) -> NDArray[np.bool_]:
+        """Return which facets of the car's mesh are not its hood."""
+        mesh = with_whole_hood(self.vehicle, self.mesh, float(np.abs(hood.plan[:, 1]).max()))
+        return np.asarray(mesh.region != mesh.names.index(HOOD))
+
+
+def with_whole_hood(vehicle: Vehicle, mesh: SurfaceMesh, half_width: float) -> SurfaceMesh:
+    """Return a mesh whose hood reaches to the gap beside the fenders.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Its zones give the regions their names; the strips beside the hood lie within the gap.
+    mesh : SurfaceMesh
+    half_width : float
+        Of the hood, m.
+    """
+    strips = [
+        k
+        for k, name in enumerate(mesh.names)
+        if vehicle.zone_index(name) >= 0 and vehicle.zones[vehicle.zone_index(name)].inner > 0.0
+    ]
+    middle = mesh.corners.mean(axis=1)
+    above = mesh.area_vectors[:, 2] > 0.5 * mesh.areas
+    own = np.isin(mesh.region, strips) & above & (np.abs(middle[:, 1]) < half_width)
+    return replace(mesh, region=np.where(own, mesh.names.index(HOOD), mesh.region))
+
+
+def head_foundation(body: Body, head_stiffness: float) -> Array:
+    """Return the elastic foundations (n,) of a body's segments, Pa/m: only the head has one.
+
+    A sphere of radius R pressed to the depth d into a foundation K feels K pi R d^2, which is the
+    force of the head's tissue at one depth of the data file.
+
+    Parameters
+    ----------
+    body : Body
+    head_stiffness : float
+        Factor on the stiffness of the head's tissue.
+    """
+    foundation = np.zeros(len(SEGMENTS))
+    depth = float(_TABLE["head_depth"])
+    tissue = build_tissue(body)["head"].scaled(force=head_stiffness)
+    radius = float(np.cbrt(np.prod(body.semi_axes[HEAD])))
+    foundation[HEAD] = float(tissue.at(np.array([depth]))[0]) / (math.pi * radius * depth**2)
+    return foundation
+
+
+def build_sheet(hood: HoodMesh, foundation: Array, relaxation: float = 0.0) -> Sheet:
+    """Return the hood at rest as a sheet that bodies press on.
+
+    Parameters
+    ----------
+    hood : HoodMesh
+    foundation : (n,) array
+        Elastic foundation of each segment, Pa/m; 0 for the law of its flesh.
+    relaxation : float
+        Time by which the foundation's pressure leads, s.
+    """
+    nodes, shells = build_shells(
+        hood.position, hood.elements, hood.thickness, hood.material, hood.materials
+    )
+    touched = np.flatnonzero(hood.sheet == OUTER)
+    own = (hood.sheet[hood.elements] == OUTER).all(axis=1)
+    area = np.zeros(len(hood.position))
+    for k in range(4):
+        np.add.at(area, hood.elements[own, k], areas(shells)[own] / 4.0)
+    low, high = hood.position.min(axis=0), hood.position.max(axis=0)
+    segments = len(foundation)
+    return Sheet(
+        nodes=nodes, shells=shells, materials=hood.materials, start=hood.position.copy(),
+        ties=hood.ties, gaps=hood.gaps, supports=hood.supports, touched=touched,
+        area=area[touched], pressed=np.zeros((len(touched), 3)),
+        box=np.stack([low, high + np.array([0.0, 0.0, ABOVE])]),
+        normal=hood.normal, foundation=foundation, relaxation=relaxation,
+        step=stable_step(shells, hood.materials), clock=np.zeros(4),
+        past=np.zeros((segments, 12)), present=np.zeros((segments, 12)), turn=np.zeros((3, 3)),
+        candidate=np.zeros((segments, len(touched)), dtype=np.int64),
+        number=np.zeros(segments, dtype=np.int64), depth=np.zeros(len(touched)),
+        impulse=np.zeros((segments, 10)), place=np.zeros((segments, 4)),
+        largest=np.zeros(segments), account=np.zeros(4), lowest=np.zeros(len(touched)),
+        frame=np.zeros((3, 3)), local=np.zeros(9),
+    )  # fmt: skip

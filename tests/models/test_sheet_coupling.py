@@ -1,0 +1,97 @@
+"""A body coupled to the shells at its own steps, against a headform stepped with the shells."""
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from builders import Array
+
+from models.criteria import head_injury_criterion
+from models.criteria.units import STANDARD_GRAVITY
+from models.crash.facet_survey import empty_findings
+from models.crash.sheet import MOVING, PARTS, SLID, STEPS, WORK
+from models.crash.sheet_front import SheetFront
+from models.crash.surfaces import CHANNELS, empty_contacts
+from models.fem.model import build_sheet, with_whole_hood
+from models.headform.facet_impact import FACET_COLUMNS, FORCE, Sphere, strike_facets
+from models.headform.facet_target import moving, sphere, sphere_skin
+from models.headform.fem_target import FemTarget
+from models.headform.impact import SAMPLES, SUMMARY
+from models.headform.model import HeadformModel
+from models.multibody.tree import empty_loads
+from models.registry import load_model
+from models.vehicle.surface.car import load_car
+from models.vehicle.surface.generator import laws_of_regions
+from models.vehicle.surface.store import load_field
+from models.vehicle.surface.wrap import wrap_point
+
+DRAFT, SPEED, MASS, RADIUS, INERTIA = 0.04, 30.0 / 3.6, 2.5, 0.065, 0.0036
+WAD, SIDE, ELEVATION = 1.35, 0.6, math.radians(79.0)
+FRICTION = 0.25
+
+
+@cache
+def stepped_together() -> tuple[float, float]:
+    """Return HIC15 and the largest force of a headform that is stepped with the shells."""
+    model = load_model("headform", {"surface": "fem", "element_size": DRAFT, "channel_class": 0.0})
+    run = model.run({"wrap_around_distance": WAD, "lateral_position": SIDE,
+                     "impact_elevation": ELEVATION})  # fmt: skip
+    return run.outputs["hic15"], run.outputs["peak_force"]
+
+
+def coupled(step: float) -> tuple[Array, SheetFront]:
+    """Return the forces (n, 3) on a headform that is stepped by itself, and its front."""
+    model = load_model("headform", {"surface": "fem", "element_size": DRAFT})
+    assert isinstance(model, HeadformModel) and isinstance(model.target, FemTarget)
+    target, car = model.target, load_car("family_car_1990s")
+    hood = target.hood({"rib_depth": 1.0, "sheet_thickness": 1.0, "yield_stress": 1.0})
+    mesh = with_whole_hood(car.vehicle, car.mesh, 0.76)
+    zones = len(car.vehicle.zones)
+    front = SheetFront(
+        field=load_field(mesh, laws_of_regions(car.vehicle, mesh)),
+        dive=np.array([1.0, 0.0, 0.0, 0.0]),
+        friction=np.full(zones, FRICTION),
+        ploughing=np.zeros(zones),
+        skin=sphere_skin(RADIUS),
+        distributed=np.ones(1),
+        found=empty_findings(zones),
+        sheet=build_sheet(hood, np.array([2e9])),
+        row=np.array([car.vehicle.zone_index("hood")]),
+        spins=np.zeros((1, 3)),
+    )
+    heading = np.array([-math.cos(ELEVATION), 0.0, -math.sin(ELEVATION)])
+    centre = wrap_point(mesh, WAD, SIDE) + (RADIUS + 0.004) * hood.normal
+    ellipsoids = sphere(RADIUS, [zone.corridor.median for zone in car.vehicle.zones], None)
+    # The last column is the law against the road: here that of the first zone, not used.
+    ellipsoids.surface_law[0, -1] = 0
+    record, summary = np.zeros((400, FACET_COLUMNS)), np.zeros(SUMMARY)
+    axes = np.stack([hood.normal, [0.0, 1.0, 0.0], np.cross(hood.normal, [0.0, 1.0, 0.0])])
+    strike_facets(
+        front, ellipsoids, Sphere(np.array([MASS]), np.array([INERTIA])),
+        moving(centre, SPEED * heading), empty_loads(1), empty_contacts(1, zones, 0),
+        np.zeros(CHANNELS), np.zeros((2, 3)), np.zeros(6), axes, step, 1, record, summary,
+    )  # fmt: skip
+    return record[: int(summary[SAMPLES]), FORCE:], front
+
+
+@pytest.mark.parametrize(("step", "within"), [(5e-5, 0.02), (1e-4, 0.03)])
+def test_exchange_at_the_bodys_steps_gives_the_same_head_injury(step: float, within: float) -> None:
+    force, front = coupled(step)
+    g = np.linalg.norm(force, axis=1) / (MASS * STANDARD_GRAVITY)
+    hic = head_injury_criterion(step * np.arange(len(g)), g, 0.015)[0]
+    expected, _ = stepped_together()
+    assert hic == pytest.approx(expected, rel=within)
+    # The sheet's steps are many to one of the body.
+    assert front.sheet.clock[STEPS] > 15 * np.count_nonzero(g) * step / 5e-5
+
+
+def test_the_sheet_books_the_work_of_the_body() -> None:
+    force, front = coupled(1e-4)
+    account, energy = front.sheet.account, front.sheet.shells.energy
+    booked = energy.sum() + account[MOVING] + account[PARTS]
+    assert account[WORK] == pytest.approx(booked, rel=0.01)
+    assert account[SLID] >= 0.0
+    # What the body lost: its momentum along the normal, by the forces on it.
+    lost = 1e-4 * force[:, 0].sum()
+    assert MASS * SPEED < lost < 2.0 * MASS * SPEED

@@ -17,7 +17,7 @@ from models.crash.scenario import HOOD, Scenario
 from models.crash.sheet import MOVING, PARTS, RUNNING, WORK, Sheet
 from models.crash.sheet_front import SheetFront
 from models.declaration import read_inputs, read_outputs
-from models.effects.registry import effects_of, load_effect
+from models.effects.registry import effects_of
 from models.facet.model import FacetModel
 from models.multibody.model import MultibodyModel
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, Body
@@ -25,7 +25,7 @@ from models.pedestrian.tissue import build_tissue
 from models.protocol import Input, Mesh
 from models.shells.explicit import areas, build_shells, stable_step
 from models.shells.hood_mesh import OUTER, HoodMesh, build_hood, hood_table
-from models.shells.settling import settle
+from models.shells.settling import AROUND, dent_near, settle
 from models.vehicle.profile import Vehicle, dive_shift, diving_points, static_point
 from models.vehicle.surface.generator import laws_of_regions
 from models.vehicle.surface.mesh import SurfaceMesh
@@ -39,8 +39,6 @@ ABOVE = 0.3
 """Height (m) of the space above the hood in which bodies wake the sheet."""
 SETTLING, DAMPING = 0.012, 600.0
 """Time (s) and damping (1/s) in which the hood comes to rest after the crash."""
-AROUND = 0.15
-"""Distance (m) of a dent from the head's contact up to which it is the head's (assumed)."""
 
 _TABLE = data.load("fem.toml")
 _MORE = read_inputs(data.load("headform.toml")["fem"])
@@ -67,9 +65,7 @@ class FemModel(FacetModel):
     name = "fem"
     version = f"{FacetModel.version}.{_TABLE['version']}"
     cost = float(_TABLE["cost"])
-    effects: tuple[str, ...] = tuple(
-        name for name in effects_of("fem") if load_effect(name).stage != "curve"
-    )
+    effects: tuple[str, ...] = effects_of("fem")
     outputs = MultibodyModel.outputs + read_outputs(_TABLE)
     _own_inputs: tuple[Input, ...] = (
         *(
@@ -151,20 +147,19 @@ class FemModel(FacetModel):
             sheet.frame, sheet.local,
         )  # fmt: skip
         contact = raw.head_contact[HeadContact.POINT : HeadContact.POINT + 3]
-        found = {
-            "permanent_dent": math.nan, "dent_behind_edge": math.nan, "hood_intrusion": math.nan,
-        }  # fmt: skip
+        found = dict.fromkeys(("permanent_dent", "dent_behind_edge", "hood_intrusion"), math.nan)
         if math.isfinite(raw.head_contact[HeadContact.TIME]):
             x, z = static_point(self.vehicle, raw.scenario.dive_angle, contact[[0, 2]])
             place = np.array([x, contact[1], z])
-            own = np.linalg.norm(sheet.start[sheet.touched] - place, axis=1) < AROUND
-            moved = (sheet.start - sheet.nodes.position)[sheet.touched] @ sheet.normal
-            dent = np.where(own, moved, -math.inf)
-            deepest = int(np.argmax(dent))
+            start = sheet.start[sheet.touched]
+            depth, where = dent_near(
+                start, sheet.nodes.position[sheet.touched], sheet.normal, place
+            )
+            own = np.linalg.norm(start - place, axis=1) < AROUND
             found = {
-                "permanent_dent": float(max(dent[deepest], 0.0)) if own.any() else 0.0,
-                "dent_behind_edge": float(hood.plan[sheet.touched[deepest], 0]),
-                "hood_intrusion": float(sheet.lowest[own].max()) if own.any() else 0.0,
+                "permanent_dent": depth,
+                "dent_behind_edge": float(hood.plan[sheet.touched[where], 0]),
+                "hood_intrusion": float(sheet.lowest[own].max(initial=0.0)),
             }
         force = raw.record[:, Column.HEAD_CAR_FORCE]
         return {name: (lambda v=value: v) for name, value in found.items()} | {

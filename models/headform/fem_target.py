@@ -25,7 +25,7 @@ from models.headform.target import SAMPLING_RATE, Strike
 from models.protocol import Input
 from models.shells.explicit import areas, build_shells, stable_step
 from models.shells.hood_mesh import OUTER, HoodMesh, build_hood, hood_table
-from models.shells.settling import settle
+from models.shells.settling import dent_near, settle
 from models.shells.state import Shells
 from models.vehicle.profile import load_vehicle
 from models.vehicle.surface.generator import generate_surface
@@ -178,14 +178,14 @@ class FemTarget:
         if not math.isnan(summary[END_TIME]):
             settle(nodes, shells, hood.materials, hood.position, *parts, step,
                    round(SETTLING / step), DAMPING, *work)  # fmt: skip
-        moved = (hood.position[touched] - nodes.position[touched]) @ hood.normal
+        dent, _ = dent_near(hood.position[touched], nodes.position[touched], hood.normal, aim)
         internal = float(balance[INTERNAL])
         return Strike(
             speeds=speeds,
             record=kept[: _end(kept)],
             summary=summary,
             force=kept[: _end(kept), FORCE:],
-            dent=(float(lowest[0]), float(max(moved.max(), 0.0))),
+            dent=(float(lowest[0]), dent),
             doubtful=bool(balance[BOW] > HOURGLASS_LIMIT * internal),
         )
 

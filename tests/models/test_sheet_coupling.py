@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from builders import Array
 
-from models.criteria import head_injury_criterion
-from models.criteria.units import STANDARD_GRAVITY
 from models.crash.facet_survey import empty_findings
 from models.crash.sheet import MOVING, PARTS, SLID, STEPS, WORK
 from models.crash.sheet_front import SheetFront
 from models.crash.surfaces import CHANNELS, empty_contacts
+from models.criteria import head_injury_criterion
+from models.criteria.units import STANDARD_GRAVITY
 from models.fem.model import build_sheet, with_whole_hood
 from models.headform.facet_impact import FACET_COLUMNS, FORCE, Sphere, strike_facets
 from models.headform.facet_target import moving, sphere, sphere_skin

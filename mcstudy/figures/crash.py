@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from mcstudy.figures import style
-from mcstudy.figures.facets import facet_collection, shaded, unit_normals
+from mcstudy.figures.facets import facet_collection, shaded, triangles, unit_normals
 
 Array = NDArray[np.float64]
 
@@ -137,7 +137,7 @@ def _draw_meshes(
     car: list[tuple[Array, Array]] = []
     body: list[tuple[Array, Array]] = []
     for mesh in scene.meshes:
-        corners = _positions(scene, mesh, frame)[mesh.faces]
+        corners = _positions(scene, mesh, frame)[triangles(mesh.faces)]
         normal = unit_normals(corners)
         seen = towards * normal[:, depth_axis] > 0.0
         owner = mesh.body if mesh.body != CAR else ""

@@ -7,6 +7,13 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+def triangles(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the faces (m, 3 or 4) of a mesh as triangles (t, 3)."""
+    if faces.shape[1] == 3:
+        return faces
+    return np.concatenate([faces[:, :3], faces[:, [0, 2, 3]]])
+
+
 def unit_normals(corners: Array) -> Array:
     """Return the unit normals (m, 3) of facets (m, 3 or 4, 3), counterclockwise from outside."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -89,7 +89,9 @@ class Sheet(NamedTuple):
     place : (n, 4) array
         Sum of the normal force times the place of contact, and of the force.
     largest : (n,) array
-        Largest depth of a segment so far, m.
+        Largest depth of a segment in the sheet's surface so far, m.
+    sunk : (n,) array
+        Largest depth so far with the displacement of the sheet, m.
     account : (4,) array
         J.
     lowest : (t,) array
@@ -125,6 +127,7 @@ class Sheet(NamedTuple):
     impulse: Array
     place: Array
     largest: Array
+    sunk: Array
     account: Array
     lowest: Array
     frame: Array
@@ -263,6 +266,10 @@ def _press(sheet, ellipsoids, i, law, mu, share, span, spin, step):
         slip = sx * sx + sy * sy + sz * sz
         drag = mu * push / math.sqrt(slip + SLIP_VELOCITY * SLIP_VELOCITY)
         drag = min(drag, STICKING * nodes.mass[n] / step)
+        moved = depth
+        for k in range(3):
+            moved -= sheet.normal[k] * (nodes.position[n, k] - sheet.start[n, k])
+        sheet.sunk[i] = max(sheet.sunk[i], moved)
         # On the node; the body takes the opposite.
         fx, fy, fz = push * nx + drag * sx, push * ny + drag * sy, push * nz + drag * sz
         nodes.force[n, 0] += fx

@@ -173,7 +173,7 @@ def sheet_carry(front, car, cosine, sine, motion, loads, contacts, power, i):
     power[CAR_NORMAL] += fx * vx + fy * vy + fz * vz + tx * wx + ty * wy + tz * wz
     contacts.zone_force[row] += J[i, 9]
     contacts.segment_force[i, row] = J[i, 9]
-    contacts.largest[i, row] = max(contacts.largest[i, row], front.sheet.largest[i])
+    contacts.largest[i, row] = max(contacts.largest[i, row], front.sheet.sunk[i])
     nx, ny, nz = vector_to_car(front, J[i, 6] / J[i, 9], J[i, 7] / J[i, 9], J[i, 8] / J[i, 9])
     contacts.normal[i, row, 0], contacts.normal[i, row, 1] = nx, ny
     contacts.normal[i, row, 2] = nz

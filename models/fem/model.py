@@ -26,6 +26,7 @@ from models.protocol import Input, Mesh
 from models.shells.explicit import areas, build_shells, stable_step
 from models.shells.hood_mesh import OUTER, HoodMesh, build_hood, hood_table
 from models.shells.settling import AROUND, dent_near, settle
+from models.shells.state import WORK_BOW
 from models.vehicle.profile import Vehicle, dive_shift, diving_points, static_point
 from models.vehicle.surface.generator import laws_of_regions
 from models.vehicle.surface.mesh import SurfaceMesh
@@ -139,6 +140,8 @@ class FemModel(FacetModel):
         booked = float(sheet.shells.energy.sum() + account[MOVING] + account[PARTS])
         work = float(account[WORK])
         residual = (work - booked) / work if work > 0.0 else 0.0
+        energy = sheet.shells.energy
+        share = float(energy[WORK_BOW] / energy.sum()) if work > 0.0 else 0.0
         step = sheet.step
         count = round(SETTLING / step) if sheet.clock[RUNNING] > 0.0 else 0
         settle(
@@ -165,6 +168,7 @@ class FemModel(FacetModel):
         return {name: (lambda v=value: v) for name, value in found.items()} | {
             "head_contact_force": lambda: float(force.max()),
             "hood_energy_residual": lambda: residual,
+            "hourglass_share": lambda: share,
         }
 
     def _meshes(self, raw: Raw) -> list[Mesh]:
@@ -261,6 +265,7 @@ def build_sheet(hood: HoodMesh, foundation: Array, relaxation: float = 0.0) -> S
         candidate=np.zeros((segments, len(touched)), dtype=np.int64),
         number=np.zeros(segments, dtype=np.int64), depth=np.zeros(len(touched)),
         impulse=np.zeros((segments, 10)), place=np.zeros((segments, 4)),
-        largest=np.zeros(segments), account=np.zeros(4), lowest=np.zeros(len(touched)),
+        largest=np.zeros(segments), sunk=np.zeros(segments), account=np.zeros(4),
+        lowest=np.zeros(len(touched)),
         frame=np.zeros((3, 3)), local=np.zeros(9),
     )  # fmt: skip

@@ -368,6 +368,19 @@ def test_facets_of_a_rigid_body_move_with_it_and_stand_for_its_ellipsoid(scene: 
         assert_allclose(np.sort(found, axis=0), np.sort(expected, axis=0), atol=1e-12)
 
 
+def test_quadrilaterals_and_triangles_are_drawn_in_one_picture(scene: Scene) -> None:
+    square = np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.0], [0.4, 0.0, 0.4], [0.0, 0.0, 0.4]])
+    both = (
+        Mesh(square, np.array([[0, 1, 2, 3]]), "car"),
+        Mesh(square, np.array([[0, 1, 2]]), "car"),
+    )
+    shown = crash.draw_strip(replace(scene, meshes=both), [0.5]).axes[0].collections[0]
+    reversed_ = tuple(replace(mesh, faces=mesh.faces[:, ::-1]) for mesh in both)
+    hidden = crash.draw_strip(replace(scene, meshes=reversed_), [0.5]).axes[0].collections[0]
+    # The side that faces the viewer is drawn: the square as two triangles.
+    assert sorted(len(it.get_paths()) for it in (shown, hidden)) == [0, 3]
+
+
 def test_the_animation_is_a_gif_of_several_pictures(scene: Scene, tmp_path: Path) -> None:
     path = tmp_path / "figures" / "crash.gif"
     crash.write_animation(scene, path, frames=3)

@@ -187,7 +187,7 @@ def test_an_effect_says_what_it_is_and_what_it_looks_like(effect: str) -> None:
     entry = load_effect(effect)
     assert (entry.title and entry.signature and entry.separated_by) or not entry.confusable
     assert "[" in entry.source or "SAE" in entry.source
-    assert set(entry.confusable) <= set(EFFECTS) and set(entry.models) <= set(NAMES)
+    assert set(entry.confusable) <= set(EFFECTS) and set(entry.models) <= set(EVERY)
     for parameter in entry.parameters.values():
         assert parameter.input.low <= parameter.none <= parameter.input.high
         assert parameter.input.unit and parameter.input.meaning

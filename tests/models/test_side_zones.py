@@ -83,7 +83,7 @@ class Front:
         motion.centre[:] = contacts.centre
         apply_car_contacts(
             self.scenario.zones, self.scenario.ellipsoids, np.zeros(6), motion,
-            empty_loads(len(SEGMENTS)), contacts, build_tree(self.scenario.body), np.zeros(7),
+            empty_loads(len(SEGMENTS)), contacts, build_tree(self.scenario.body), np.zeros(7), 0.0,
         )  # fmt: skip
         force = contacts.segment_force[HEAD]
         return {zone.name: float(force[j]) for j, zone in enumerate(self.vehicle.zones)}

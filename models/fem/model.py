@@ -23,8 +23,8 @@ from models.multibody.model import MultibodyModel
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, Body
 from models.pedestrian.tissue import build_tissue
 from models.protocol import Input, Mesh
-from models.shells.explicit import areas, build_shells, stable_step
-from models.shells.hood_mesh import OUTER, HoodMesh, build_hood, hood_table
+from models.shells.explicit import build_shells, stable_step
+from models.shells.hood_mesh import OUTER, HoodMesh, build_hood, hood_table, outer_areas
 from models.shells.settling import AROUND, dent_near, settle
 from models.shells.state import WORK_BOW
 from models.vehicle.profile import Vehicle, dive_shift, diving_points, static_point
@@ -248,16 +248,12 @@ def build_sheet(hood: HoodMesh, foundation: Array, relaxation: float = 0.0) -> S
         hood.position, hood.elements, hood.thickness, hood.material, hood.materials
     )
     touched = np.flatnonzero(hood.sheet == OUTER)
-    own = (hood.sheet[hood.elements] == OUTER).all(axis=1)
-    area = np.zeros(len(hood.position))
-    for k in range(4):
-        np.add.at(area, hood.elements[own, k], areas(shells)[own] / 4.0)
     low, high = hood.position.min(axis=0), hood.position.max(axis=0)
     segments = len(foundation)
     return Sheet(
         nodes=nodes, shells=shells, materials=hood.materials, start=hood.position.copy(),
         ties=hood.ties, gaps=hood.gaps, supports=hood.supports, touched=touched,
-        area=area[touched], pressed=np.zeros((len(touched), 3)),
+        area=outer_areas(hood, shells)[touched], pressed=np.zeros((len(touched), 3)),
         box=np.stack([low, high + np.array([0.0, 0.0, ABOVE])]),
         normal=hood.normal, foundation=foundation, relaxation=relaxation,
         step=stable_step(shells, hood.materials), clock=np.zeros(4),

@@ -23,10 +23,9 @@ from models.headform.shell_impact import (
 )
 from models.headform.target import SAMPLING_RATE, Strike
 from models.protocol import Input
-from models.shells.explicit import areas, build_shells, stable_step
-from models.shells.hood_mesh import OUTER, HoodMesh, build_hood, hood_table
+from models.shells.explicit import build_shells, stable_step
+from models.shells.hood_mesh import OUTER, HoodMesh, build_hood, hood_table, outer_areas
 from models.shells.settling import dent_near, settle
-from models.shells.state import Shells
 from models.vehicle.profile import load_vehicle
 from models.vehicle.surface.generator import generate_surface
 from models.vehicle.surface.wrap import wrap_point
@@ -168,7 +167,7 @@ class FemTarget:
         lowest = np.zeros(2)
         strike_shells(
             nodes, shells, hood.materials, hood.position, *parts, touched,
-            self._foundation * _node_areas(hood, shells)[touched], values["friction_body_car"],
+            self._foundation * outer_areas(hood, shells)[touched], values["friction_body_car"],
             impactor.mass, impactor.inertia, impactor.radius, centre, velocity, np.zeros(3), axes,
             step, stride, LEAVING, np.zeros(9), *work, record, balance, summary, lowest,
         )  # fmt: skip
@@ -213,13 +212,3 @@ def _axes(normal: Array, heading: Array) -> Array:
     size = float(np.linalg.norm(along))
     slide = np.array([normal[2], 0.0, -normal[0]]) if size < 1e-9 else along / size
     return np.stack([normal, slide, np.cross(normal, slide)])
-
-
-def _node_areas(hood: HoodMesh, shells: Shells) -> Array:
-    """Return the area of the outer sheet about each node, m2."""
-    own = (hood.sheet[hood.elements] == OUTER).all(axis=1)
-    area = np.zeros(len(hood.position))
-    quarter = areas(shells)[own] / 4.0
-    for k in range(4):
-        np.add.at(area, hood.elements[own, k], quarter)
-    return area

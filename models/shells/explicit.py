@@ -1,7 +1,5 @@
 """Central differences in time for a mesh of shells."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -191,43 +189,3 @@ def internal_forces(nodes, shells, materials, step, frame, local):
     clear_loads(nodes)
     for e in range(shells.node.shape[0]):
         update_element(nodes, shells, materials, e, step, frame, local)
-
-
-@kernel
-def run_free(nodes, shells, materials, step, count, loaded, load, history, frame, local):
-    """Step a mesh under nodal forces that vary in time.
-
-    Parameters
-    ----------
-    nodes : Nodes
-    shells : Shells
-    materials : Materials
-    step : float
-        s.
-    count : int
-        Number of steps.
-    loaded : (l,) array of int
-        Nodes that are loaded.
-    load : (count, l, 3) array
-        Forces on them at each step, N.
-    history : (count, 3) array
-        Filled: kinetic energy (J), work of the loads (J), z of the first loaded node (m).
-    frame : (3, 3) array
-        Workspace.
-    local : (9,) array
-        Workspace.
-    """
-    work = 0.0
-    for k in range(count):
-        internal_forces(nodes, shells, materials, step, frame, local)
-        for i in range(loaded.shape[0]):
-            for j in range(3):
-                nodes.force[loaded[i], j] += load[k, i, j]
-                work += 0.5 * step * load[k, i, j] * nodes.velocity[loaded[i], j]
-        history[k, 1] = work
-        # Velocities lie half a step before the first forces.
-        history[k, 0] = advance(nodes, step, step if k > 0 else 0.5 * step)
-        for i in range(loaded.shape[0]):
-            for j in range(3):
-                work += 0.5 * step * load[k, i, j] * nodes.velocity[loaded[i], j]
-        history[k, 2] = nodes.position[loaded[0], 2] if loaded.shape[0] > 0 else math.nan

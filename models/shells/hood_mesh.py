@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models import data
+from models.shells.explicit import areas
 from models.shells.material import Materials
 from models.shells.parts import Gaps, Supports, Ties
+from models.shells.state import Shells
 from models.vehicle.profile import Vehicle
 
 Array = NDArray[np.float64]
@@ -138,6 +140,22 @@ def build_hood(
         gaps=_gaps(table, bottom, number, apart, area, lumped, plan, sum(thickness) / 2.0, normal),
         supports=_supports(table["supports"], position, plan, len(s), number, normal),
     )
+
+
+def outer_areas(hood: HoodMesh, shells: Shells) -> Array:
+    """Return the area (n,) of the outer sheet about each node, m2; 0 on the inner sheet.
+
+    Parameters
+    ----------
+    hood : HoodMesh
+    shells : Shells
+        Of the hood.
+    """
+    own = (hood.sheet[hood.elements] == OUTER).all(axis=1)
+    area = np.zeros(len(hood.position))
+    for k in range(4):
+        np.add.at(area, hood.elements[own, k], areas(shells)[own] / 4.0)
+    return area
 
 
 def _edges(ribs: Mapping[str, Any], way: str, first: float, last: float) -> list[float]:

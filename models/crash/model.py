@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from models.crash import outcome
 from models.crash.record import END_REASONS, Column, Frame, Summary
 from models.crash.scenario import HOOD, Scenario
+from models.crash.tape import Tape, tape_on_zones
 from models.declaration import run_rows
 from models.effects.chain import build_chain
 from models.pedestrian.anthropometry import SEGMENTS, is_possible
@@ -160,9 +161,9 @@ class CrashModel(ABC):
         """Return the evaluators of outputs that a model adds or replaces."""
         return {}
 
-    def _tape(self, scenario: Scenario, zone: int, point: Array) -> outcome.Tape:
-        """Return what a tape on the car measures; see ``models.crash.outcome.tape_on_zones``."""
-        return outcome.tape_on_zones(scenario, zone, point)
+    def _tape(self, scenario: Scenario, zone: int, point: Array) -> Tape:
+        """Return what a tape on the car measures; see ``models.crash.tape.tape_on_zones``."""
+        return tape_on_zones(scenario, zone, point)
 
     @abstractmethod
     def _step(self, values: dict[str, float]) -> outcome.Raw | None:

@@ -12,6 +12,7 @@ from models.contact.law import SURFACE, interpolate_law
 from models.crash.record import Column, Frame, HeadContact, Summary
 from models.crash.scenario import Scenario
 from models.crash.surfaces import WORK_CHANNELS
+from models.crash.tape import Measured, Tape, tape_on_zones
 from models.criteria import (
     brain_injury_criterion,
     clip_level,
@@ -27,12 +28,6 @@ from models.effects.reading import Reading, record_reading
 from models.pedestrian.anthropometry import HEAD, SEGMENTS
 from models.protocol import History, Mesh, Scene, chosen_histories, history_of
 from models.vehicle.motion import stopping_distance
-from models.vehicle.profile import (
-    hood_edge_distance,
-    static_point,
-    surface_point,
-    wrap_around_distance,
-)
 from models.vehicle.zones import ROLL
 
 Array = NDArray[np.float64]
@@ -172,43 +167,6 @@ class Signals:
         if not frequency_class:
             return signal
         return filter_cfc(signal, SAMPLING_RATE, frequency_class, overwrite=True)
-
-
-@dataclass(frozen=True)
-class Tape:
-    """Distances measured with a tape on the car.
-
-    Attributes
-    ----------
-    wrap_around : float
-        Wrap-around distance of the head's first contact, m.
-    leading_edge : float
-        Wrap-around distance of the hood's leading edge, m.
-    """
-
-    wrap_around: float
-    leading_edge: float
-
-
-def tape_on_zones(scenario: Scenario, zone: int, point: Array) -> Tape:
-    """Return what a tape over the zones in side view measures.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    zone : int
-        Row of the zone that the head struck.
-    point : (3,) array
-        Deepest point of the head at first contact, frame of the diving car, m.
-    """
-    vehicle = scenario.vehicle
-    surface = surface_point(scenario.zones, zone, point[[0, 2]])
-    static = static_point(vehicle, scenario.dive_angle, surface)
-    return Tape(wrap_around_distance(vehicle.name, zone, static), hood_edge_distance(vehicle.name))
-
-
-Measured = Callable[[Scenario, int, Array], Tape]
-"""What measures distances on a car; see ``tape_on_zones``."""
 
 
 def measures(

@@ -10,8 +10,9 @@ from models import data
 from models.crash.facet_front import FacetFront
 from models.crash.facet_survey import empty_findings
 from models.crash.model import TICK
-from models.crash.outcome import ANGULAR_CLASS, LINEAR_CLASS, Raw, Tape
+from models.crash.outcome import ANGULAR_CLASS, LINEAR_CLASS, Raw
 from models.crash.scenario import Scenario
+from models.crash.tape import Tape
 from models.effects.registry import effects_of
 from models.multibody.model import MultibodyModel
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK, Body

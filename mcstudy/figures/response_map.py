@@ -131,7 +131,9 @@ def draw_maps(
                     _draw_cells(axes, panel, norm, palette)
                 else:
                     _draw_places(axes, panel, norm, palette, front)
-                axes.set(title=style.safe(panel.title), xlabel=labels[0], ylabel=labels[1])
+                axes.set(xlabel=labels[0], ylabel=labels[1])
+                if panel.title:
+                    axes.set_title(style.safe(panel.title))
         if scale.limits:
             handles = [
                 Patch(facecolor=palette(k), edgecolor=style.GREY, label=text)

@@ -10,6 +10,10 @@ SLIP_RATE = 600.0
 """Largest friction coefficient per mass (1/s): keeps the regularised friction of a light body
 in a hard impact slower than the step (assumed)."""
 
+STICKING = 0.2
+"""Largest share of a node's momentum along a sheet of shells that friction takes in a step
+(assumed): keeps a light node from being thrown back and forth."""
+
 
 @inlined_kernel
 def friction_coefficient(mu, normal, slip_square, mass):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.compilation import inlined_kernel
-from models.contact.friction import SLIP_VELOCITY
+from models.contact.friction import SLIP_VELOCITY, STICKING
 from models.crash.surfaces import law_force
 from models.shells.element import update_element
 from models.shells.explicit import advance, clear_loads
@@ -34,8 +34,6 @@ ASLEEP = 0.02
 LIGHT = 30.0
 """Force (N) on a segment below which the sheet counts as free of it (assumed): a limb that drags
 over the hood does not dent it."""
-STICKING = 0.2
-"""Largest share of a node's momentum along the sheet that friction takes in a step (assumed)."""
 
 # Entries of the clock.
 NOW, RUNNING, LAST_CONTACT, STEPS = range(4)
@@ -67,8 +65,6 @@ class Sheet(NamedTuple):
         Outward normal of the sheet's plane.
     foundation : (n,) array
         Elastic foundation of each segment, Pa/m; 0 for the law of its flesh.
-    relaxation : float
-        Time (s) by which the foundation's pressure leads: its damping.
     step : float
         Largest step, s.
     clock : (4,) array
@@ -115,7 +111,6 @@ class Sheet(NamedTuple):
     box: Array
     normal: Array
     foundation: Array
-    relaxation: float
     step: float
     clock: Array
     past: Array
@@ -257,9 +252,6 @@ def _press(sheet, ellipsoids, i, law, mu, share, span, spin, step):
         sz = uz + spin[0] * dy - spin[1] * dx - nodes.velocity[n, 2]
         rate = sx * nx + sy * ny + sz * nz
         push = stiff * sheet.area[t] * depth
-        if sheet.foundation[i] > 0.0:
-            lead = min(stiff * sheet.area[t] * sheet.relaxation, STICKING * nodes.mass[n] / step)
-            push = max(push + lead * rate, 0.0)
         if push <= 0.0:
             continue
         sx, sy, sz = sx - rate * nx, sy - rate * ny, sz - rate * nz

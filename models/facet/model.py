@@ -30,6 +30,9 @@ from models.protocol import Mesh
 from models.vehicle.profile import dive_shift, diving_points, static_point
 from models.vehicle.surface.car import load_car
 from models.vehicle.surface.field import distances
+from models.vehicle.surface.generator import laws_of_regions
+from models.vehicle.surface.mesh import SurfaceMesh
+from models.vehicle.surface.store import load_field
 from models.vehicle.surface.wrap import leading_edge_distance, section, wrap_distance
 
 Array = NDArray[np.float64]
@@ -107,8 +110,8 @@ class FacetModel(MultibodyModel):
             self._subdivisions[row] = max(int(subdivisions), FINE)
         self._bare = child == "ellipsoids"
         self._distributed = np.array([float(load == "distributed")])
-        self.mesh = car.mesh
-        self._field = car.field()
+        self.mesh = self._regions_of(car.mesh)
+        self._field = load_field(self.mesh, laws_of_regions(self.vehicle, self.mesh))
         self._found = empty_findings(len(self.vehicle.zones))
 
     def front_of(self, scenario: Scenario) -> FacetFront:
@@ -123,6 +126,10 @@ class FacetModel(MultibodyModel):
             distributed=self._distributed,
             found=self._found,
         )
+
+    def _regions_of(self, mesh: SurfaceMesh) -> SurfaceMesh:
+        """Return the car's mesh with the regions that this model gives it."""
+        return mesh
 
     def _skin(self, body: Body) -> Skin:
         """Return the surface of a body."""

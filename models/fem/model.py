@@ -1,5 +1,6 @@
 """The finite-element crash model behind the model protocol."""
 
+import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -9,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models import data
-from models.crash.facet_survey import empty_findings
 from models.crash.model import TICK
 from models.crash.outcome import ANGULAR_CLASS, LINEAR_CLASS, Raw
 from models.crash.record import Column, HeadContact
@@ -24,13 +24,11 @@ from models.pedestrian.anthropometry import HEAD, SEGMENTS, Body
 from models.pedestrian.tissue import build_tissue
 from models.protocol import Input, Mesh
 from models.shells.explicit import build_shells, stable_step
-from models.shells.hood_mesh import OUTER, HoodMesh, build_hood, hood_table, outer_areas
-from models.shells.settling import AROUND, dent_near, settle
+from models.shells.hood_mesh import OUTER, HoodMesh, build_hood, check_size, hood_table, outer_areas
+from models.shells.settling import AROUND, dent_near, settle, settling_steps
 from models.shells.state import WORK_BOW
-from models.vehicle.profile import Vehicle, dive_shift, diving_points, static_point
-from models.vehicle.surface.generator import laws_of_regions
+from models.vehicle.profile import Vehicle, diving_points, static_point
 from models.vehicle.surface.mesh import SurfaceMesh
-from models.vehicle.surface.store import load_field
 
 Array = NDArray[np.float64]
 
@@ -38,8 +36,9 @@ SIZE = 0.02
 """Default size of the elements, m."""
 ABOVE = 0.3
 """Height (m) of the space above the hood in which bodies wake the sheet."""
-SETTLING, DAMPING = 0.012, 600.0
-"""Time (s) and damping (1/s) in which the hood comes to rest after the crash."""
+
+DENT = ("permanent_dent", "dent_behind_edge", "hood_intrusion")
+"""Outputs of the head's dent."""
 
 _TABLE = data.load("fem.toml")
 _MORE = read_inputs(data.load("headform.toml")["fem"])
@@ -86,8 +85,7 @@ class FemModel(FacetModel):
         angular_class: float = ANGULAR_CLASS,
         effects: Mapping[str, Mapping[str, float]] | None = None,
     ) -> None:
-        if not 0.008 <= float(element_size) <= 0.06:
-            raise ValueError(f"element_size must lie within 0.008 and 0.06 m, given {element_size}")
+        check_size(float(element_size))
         table = hood_table(vehicle)
         super().__init__(
             vehicle, tick=tick, channel_class=channel_class, angular_class=angular_class,
@@ -95,8 +93,6 @@ class FemModel(FacetModel):
         )  # fmt: skip
         self.size = float(element_size)
         self.version = f"{self.version}.{table['version']}"
-        mesh = with_whole_hood(self.vehicle, self.mesh, table["hood"]["half_width"])
-        self._field = load_field(mesh, laws_of_regions(self.vehicle, mesh))
         self._values: Mapping[str, float] = {}
         self._sheet: Sheet | None = None
         self._hood: HoodMesh | None = None
@@ -112,24 +108,19 @@ class FemModel(FacetModel):
             self.vehicle, self.size, rib=values["rib_depth"], sheet=values["sheet_thickness"],
             strength=values["yield_stress"],
         )  # fmt: skip
-        self._sheet = build_sheet(
-            hood,
-            head_foundation(scenario.body, values["head_stiffness"]),
-            float(_TABLE["relaxation"]),
-        )
-        dive = scenario.dive_angle
+        foundation = head_foundation(scenario.body, values["head_stiffness"])
+        self._sheet = build_sheet(hood, foundation)
         return SheetFront(
-            field=self._field,
-            dive=np.array([math.cos(dive), math.sin(dive), *dive_shift(self.vehicle, dive)]),
-            friction=scenario.zones.friction,
-            ploughing=scenario.zones.ploughing,
-            skin=self._skin(scenario.body),
-            distributed=self._distributed,
-            found=empty_findings(len(self.vehicle.zones)),
+            *super().front_of(scenario),
             sheet=self._sheet,
             row=np.array([self.vehicle.zone_index(HOOD)]),
             spins=np.zeros((len(SEGMENTS), 3)),
         )
+
+    def _regions_of(self, mesh: SurfaceMesh) -> SurfaceMesh:
+        """Return the car's mesh with a hood that reaches to the fenders, as the sheet does."""
+        table = hood_table(self.vehicle.name)
+        return with_whole_hood(self.vehicle, mesh, table["hood"]["half_width"])
 
     def _more_measures(self, raw: Raw) -> dict[str, Callable[[], float]]:
         """Return the evaluators of the outputs that the sheet gives."""
@@ -142,34 +133,41 @@ class FemModel(FacetModel):
         residual = (work - booked) / work if work > 0.0 else 0.0
         energy = sheet.shells.energy
         share = float(energy[WORK_BOW] / energy.sum()) if work > 0.0 else 0.0
-        step = sheet.step
-        count = round(SETTLING / step) if sheet.clock[RUNNING] > 0.0 else 0
-        settle(
-            sheet.nodes, sheet.shells, sheet.materials, sheet.start, sheet.ties, sheet.gaps,
-            sheet.supports, step, count, DAMPING,
-            sheet.frame, sheet.local,
-        )  # fmt: skip
-        contact = raw.head_contact[HeadContact.POINT : HeadContact.POINT + 3]
-        found = dict.fromkeys(("permanent_dent", "dent_behind_edge", "hood_intrusion"), math.nan)
-        if math.isfinite(raw.head_contact[HeadContact.TIME]):
-            x, z = static_point(self.vehicle, raw.scenario.dive_angle, contact[[0, 2]])
-            place = np.array([x, contact[1], z])
-            start = sheet.start[sheet.touched]
-            depth, where = dent_near(
-                start, sheet.nodes.position[sheet.touched], sheet.normal, place
-            )
-            own = np.linalg.norm(start - place, axis=1) < AROUND
-            found = {
-                "permanent_dent": depth,
-                "dent_behind_edge": float(hood.plan[sheet.touched[where], 0]),
-                "hood_intrusion": float(sheet.lowest[own].max(initial=0.0)),
-            }
+
+        @functools.cache
+        def dent() -> dict[str, float]:
+            return self._dent_of(raw, sheet, hood)
+
+        def of_dent(name: str) -> Callable[[], float]:
+            return lambda: dent()[name]
+
         force = raw.record[:, Column.HEAD_CAR_FORCE]
-        return {name: (lambda v=value: v) for name, value in found.items()} | {
+        return {name: of_dent(name) for name in DENT} | {
             "head_contact_force": lambda: float(force.max()),
             "hood_energy_residual": lambda: residual,
             "hourglass_share": lambda: share,
         }
+
+    def _dent_of(self, raw: Raw, sheet: Sheet, hood: HoodMesh) -> dict[str, float]:
+        """Return the outputs of the head's dent, after the hood has come to rest."""
+        settle(
+            sheet.nodes, sheet.shells, sheet.materials, sheet.start, sheet.ties, sheet.gaps,
+            sheet.supports, sheet.step,
+            settling_steps(sheet.step) if sheet.clock[RUNNING] > 0.0 else 0,
+            sheet.frame, sheet.local,
+        )  # fmt: skip
+        if not math.isfinite(raw.head_contact[HeadContact.TIME]):
+            return dict.fromkeys(DENT, math.nan)
+        contact = raw.head_contact[HeadContact.POINT : HeadContact.POINT + 3]
+        x, z = static_point(self.vehicle, raw.scenario.dive_angle, contact[[0, 2]])
+        place = np.array([x, contact[1], z])
+        start, now = sheet.start[sheet.touched], sheet.nodes.position[sheet.touched]
+        depth, where = dent_near(start, now, sheet.normal, place)
+        own = np.linalg.norm(start - place, axis=1) < AROUND
+        behind = float(hood.plan[sheet.touched[where], 0])
+        return dict(
+            zip(DENT, (depth, behind, float(sheet.lowest[own].max(initial=0.0))), strict=True)
+        )
 
     def _meshes(self, raw: Raw) -> list[Mesh]:
         """Return the car without its hood, the dented hood, and the child."""
@@ -177,18 +175,13 @@ class FemModel(FacetModel):
         sheet, hood = self._sheet, self._hood
         assert sheet is not None
         assert hood is not None
-        kept = self._is_body(hood)
+        kept = self.mesh.region != self.mesh.names.index(HOOD)
         car = found[0]
         found[0] = Mesh("car", car.nodes, car.faces[kept], "car")
         outer = hood.elements[(hood.sheet[hood.elements] == OUTER).all(axis=1)]
         nodes = sheet.nodes.position.copy()
         nodes[:, [0, 2]] = diving_points(self.vehicle, raw.scenario.dive_angle, nodes[:, [0, 2]])
         return [*found, Mesh("hood", nodes, outer, "car")]
-
-    def _is_body(self, hood: HoodMesh) -> NDArray[np.bool_]:
-        """Return which facets of the car's mesh are not its hood."""
-        mesh = with_whole_hood(self.vehicle, self.mesh, float(np.abs(hood.plan[:, 1]).max()))
-        return np.asarray(mesh.region != mesh.names.index(HOOD))
 
 
 def with_whole_hood(vehicle: Vehicle, mesh: SurfaceMesh, half_width: float) -> SurfaceMesh:
@@ -233,7 +226,7 @@ def head_foundation(body: Body, head_stiffness: float) -> Array:
     return foundation
 
 
-def build_sheet(hood: HoodMesh, foundation: Array, relaxation: float = 0.0) -> Sheet:
+def build_sheet(hood: HoodMesh, foundation: Array) -> Sheet:
     """Return the hood at rest as a sheet that bodies press on.
 
     Parameters
@@ -241,8 +234,6 @@ def build_sheet(hood: HoodMesh, foundation: Array, relaxation: float = 0.0) -> S
     hood : HoodMesh
     foundation : (n,) array
         Elastic foundation of each segment, Pa/m; 0 for the law of its flesh.
-    relaxation : float
-        Time by which the foundation's pressure leads, s.
     """
     nodes, shells = build_shells(
         hood.position, hood.elements, hood.thickness, hood.material, hood.materials
@@ -255,7 +246,7 @@ def build_sheet(hood: HoodMesh, foundation: Array, relaxation: float = 0.0) -> S
         ties=hood.ties, gaps=hood.gaps, supports=hood.supports, touched=touched,
         area=outer_areas(hood, shells)[touched], pressed=np.zeros((len(touched), 3)),
         box=np.stack([low, high + np.array([0.0, 0.0, ABOVE])]),
-        normal=hood.normal, foundation=foundation, relaxation=relaxation,
+        normal=hood.normal, foundation=foundation,
         step=stable_step(shells, hood.materials), clock=np.zeros(4),
         past=np.zeros((segments, 12)), present=np.zeros((segments, 12)), turn=np.zeros((3, 3)),
         candidate=np.zeros((segments, len(touched)), dtype=np.int64),

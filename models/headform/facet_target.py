@@ -25,6 +25,7 @@ from models.headform.target import (
     LONGEST_CONTACT,
     SAMPLING_RATE,
     Strike,
+    impact_axes,
     skin_of,
     steps_per_sample,
     write_law,
@@ -235,13 +236,9 @@ class FacetTarget:
         else:
             return None
         normal = gradient[0] / np.linalg.norm(gradient[0])
-        along = heading - (heading @ normal) * normal
-        slip = float(np.linalg.norm(along))
         if travelled > FURTHEST or heading @ normal >= 0.0:
             return None
-        across = np.array([normal[2], 0.0, -normal[0]]) if slip < 1e-9 else along
-        across = across / np.linalg.norm(across)
-        return centre, np.stack([normal, across, np.cross(normal, across)])
+        return centre, impact_axes(normal, heading)
 
     def _front(self, friction: float, ploughing: float, radius: float) -> FacetFront:
         regions = len(self.vehicle.zones)

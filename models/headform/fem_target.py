@@ -12,20 +12,19 @@ from models.contact.law import ForceCurve
 from models.declaration import read_inputs
 from models.effects.chain import EffectChain
 from models.effects.registry import effects_of, load_effect
-from models.headform.facet_impact import FORCE
+from models.headform.facet_impact import FACET_COLUMNS, FORCE
 from models.headform.impact import END_TIME, NORMAL, SAMPLES, SUMMARY, Impactor
 from models.headform.shell_impact import (
     BALANCE,
     BOW,
-    FEM_COLUMNS,
     INTERNAL,
     strike_shells,
 )
-from models.headform.target import SAMPLING_RATE, Strike
+from models.headform.target import SAMPLING_RATE, Strike, impact_axes
 from models.protocol import Input
 from models.shells.explicit import build_shells, stable_step
-from models.shells.hood_mesh import OUTER, HoodMesh, build_hood, hood_table, outer_areas
-from models.shells.settling import dent_near, settle
+from models.shells.hood_mesh import OUTER, HoodMesh, build_hood, check_size, hood_table, outer_areas
+from models.shells.settling import dent_near, settle, settling_steps
 from models.vehicle.profile import load_vehicle
 from models.vehicle.surface.generator import generate_surface
 from models.vehicle.surface.wrap import wrap_point
@@ -37,10 +36,6 @@ LONGEST = 0.06
 LEAVING = 0.002
 """Time (s) without contact after which the headform has left: a vibrating sheet may come after it.
 """
-SETTLING = 0.012
-"""Time (s) over which the sheet comes to rest after the impact, damped."""
-DAMPING = 600.0
-"""Damping (1/s) of the sheet while it comes to rest: critical at 95 Hz."""
 FURTHEST = 0.3
 """Distance (m) over which a headform is moved to the sheet at most."""
 HOURGLASS_LIMIT = 0.1
@@ -78,8 +73,7 @@ class FemTarget:
     )
 
     def __init__(self, nominal: Mapping[str, float], vehicle: str | None, size: float) -> None:
-        if not 0.008 <= size <= 0.06:
-            raise ValueError(f"element_size must lie within 0.008 and 0.06 m, given {size:g}")
+        check_size(size)
         self.vehicle = load_vehicle(vehicle or "family_car_1990s")
         table = hood_table(self.vehicle.name)
         self.size = size
@@ -158,8 +152,8 @@ class FemTarget:
         stride = math.ceil(1.0 / (SAMPLING_RATE * stable_step(shells, hood.materials)))
         step = 1.0 / (SAMPLING_RATE * stride)
         velocity = values["impact_speed"] * heading
-        axes = _axes(hood.normal, heading)
-        record = np.empty((round(LONGEST * SAMPLING_RATE), FEM_COLUMNS))
+        axes = impact_axes(hood.normal, heading)
+        record = np.empty((round(LONGEST * SAMPLING_RATE), FACET_COLUMNS))
         summary, balance = np.zeros(SUMMARY), np.zeros(BALANCE)
         speeds = (float(-velocity @ axes[0]), float(velocity @ axes[1]))
         parts = (hood.ties, hood.gaps, hood.supports)
@@ -176,7 +170,7 @@ class FemTarget:
             return None
         if not math.isnan(summary[END_TIME]):
             settle(nodes, shells, hood.materials, hood.position, *parts, step,
-                   round(SETTLING / step), DAMPING, *work)  # fmt: skip
+                   settling_steps(step), *work)  # fmt: skip
         dent, _ = dent_near(hood.position[touched], nodes.position[touched], hood.normal, aim)
         internal = float(balance[INTERNAL])
         return Strike(
@@ -204,11 +198,3 @@ def _place(centre: Array, heading: Array, points: Array, radius: float) -> Array
         return None
     travel = float((along[near] - np.sqrt(radius**2 - beside[near])).min())
     return None if abs(travel) > FURTHEST else centre + travel * heading
-
-
-def _axes(normal: Array, heading: Array) -> Array:
-    """Return normal, direction of the slide and their normal as rows."""
-    along = heading - (heading @ normal) * normal
-    size = float(np.linalg.norm(along))
-    slide = np.array([normal[2], 0.0, -normal[0]]) if size < 1e-9 else along / size
-    return np.stack([normal, slide, np.cross(normal, slide)])

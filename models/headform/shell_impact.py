@@ -7,8 +7,8 @@ area. Gravity is neglected, as for a headform against a plane.
 import math
 
 from models.compilation import inlined_kernel, kernel
-from models.contact.friction import SLIP_VELOCITY
-from models.headform.facet_impact import FACET_COLUMNS, FORCE
+from models.contact.friction import SLIP_VELOCITY, STICKING
+from models.headform.facet_impact import FORCE
 from models.headform.impact import (
     ABSORBED,
     DEEPEST,
@@ -27,11 +27,6 @@ from models.headform.impact import (
 from models.shells.element import update_element
 from models.shells.explicit import advance, clear_loads
 from models.shells.parts import apply_parts
-
-FEM_COLUMNS = FACET_COLUMNS
-STICKING = 0.2
-"""Largest share of a node's momentum along the sheet that friction takes in a step (assumed): keeps
-a light node from being thrown back and forth."""
 
 # Places of the energy balance (J); the last is the sum of the elements' four.
 KINETIC, SECTION, SHEAR, BOW, DRILL, PARTS, SKIN, FRICTION, HEADFORM, INTERNAL = range(10)
@@ -149,7 +144,7 @@ def strike_shells(
         Workspace.
     local : (9,) array
         Workspace.
-    record : (samples, FEM_COLUMNS) array
+    record : (samples, FACET_COLUMNS) array
         Filled, as in ``models.headform.facet_impact``; penetration is the headform's own travel.
     balance : (BALANCE,) array
         Filled: energy by place, J.

@@ -128,6 +128,23 @@ def steps_per_sample(stiffest: float, damping: float, mass: float) -> int:
     return min(max(stride, FINEST), MAX_STEPS)
 
 
+def impact_axes(normal: Array, heading: Array) -> Array:
+    """Return the normal, the direction of the slide and their normal as rows (3, 3).
+
+    Parameters
+    ----------
+    normal : (3,) array
+        Outward unit normal of the surface.
+    heading : (3,) array
+        Unit vector of the headform's velocity.
+    """
+    along = heading - (heading @ normal) * normal
+    size = float(np.linalg.norm(along))
+    slide = np.array([normal[2], 0.0, -normal[0]]) if size < 1e-9 else along
+    slide = slide / np.linalg.norm(slide)
+    return np.stack([normal, slide, np.cross(normal, slide)])
+
+
 def vinyl_skin() -> ForceCurve:
     """Return the loading curve of the headforms' vinyl skin."""
     row = data.load("headforms.toml")["skin"]

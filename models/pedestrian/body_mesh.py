@@ -142,7 +142,7 @@ def _shape(raw: SurfaceMesh, scale: float, person: Body, row: int, file: str) ->
             f"{file}: lies {middle:.3g} m from the {SEGMENTS[row].replace('_', ' ')} of a standing "
             "person; check unit, axes and person"
         )
-    fine, cut = subdivide_to_size(nodes, facets, FINENESS)  # type: ignore[no-untyped-call]
+    fine, cut = subdivide_to_size(nodes, facets, FINENESS)
     joined = SurfaceMesh(
         np.asarray(fine), np.asarray(cut, dtype=np.int64), np.zeros(len(cut), np.int64), ("",)
     ).compact()

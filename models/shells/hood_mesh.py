@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 OUTER, INNER = 0, 1
+SMALLEST, LARGEST = 0.008, 0.06
+"""Sizes of the elements, m (assumed)."""
 NARROW = 1.25
 """Length of an element, over the size asked for, from which on it is halved."""
 
@@ -77,6 +79,14 @@ def hood_table(vehicle: str) -> dict[str, Any]:
         known = ", ".join(data.names("fem"))
         raise ValueError(f"{vehicle!r} has no finite elements; there are those of {known}")
     return data.load(f"fem/{vehicle}.toml")
+
+
+def check_size(size: float) -> None:
+    """Raise ``ValueError`` if an element size (m) is not within 8 to 60 mm."""
+    if not SMALLEST <= size <= LARGEST:
+        raise ValueError(
+            f"element_size must lie within {SMALLEST:g} and {LARGEST:g} m, given {size:g}"
+        )
 
 
 def build_hood(
@@ -152,9 +162,9 @@ def outer_areas(hood: HoodMesh, shells: Shells) -> Array:
         Of the hood.
     """
     own = (hood.sheet[hood.elements] == OUTER).all(axis=1)
-    area = np.zeros(len(hood.position))
+    area, quarter = np.zeros(len(hood.position)), areas(shells)[own] / 4.0
     for k in range(4):
-        np.add.at(area, hood.elements[own, k], areas(shells)[own] / 4.0)
+        np.add.at(area, hood.elements[own, k], quarter)
     return area
 
 

@@ -12,8 +12,17 @@ Array = NDArray[np.float64]
 
 AROUND = 0.15
 """Distance (m) from a contact up to which a dent is its own (assumed)."""
+SETTLING = 0.012
+"""Time (s) over which a sheet comes to rest after an impact (assumed)."""
+DAMPING = 600.0
+"""Damping (1/s) of the sheet in that time: critical at 95 Hz (assumed)."""
 RING = 0.3
 """Distance (m) from a contact up to which the sheet shows how it moved as a whole (assumed)."""
+
+
+def settling_steps(step: float) -> int:
+    """Return the number of steps (s) in which a sheet comes to rest."""
+    return round(SETTLING / step)
 
 
 def dent_near(start: Array, position: Array, normal: Array, place: Array) -> tuple[float, int]:
@@ -47,7 +56,7 @@ def dent_near(start: Array, position: Array, normal: Array, place: Array) -> tup
 
 @kernel
 def settle(
-    nodes, shells, materials, start, ties, gaps, supports, step, count, damping, frame, local
+    nodes, shells, materials, start, ties, gaps, supports, step, count, frame, local
 ):  # fmt: skip
     """Let a mesh come to rest by damping in proportion to mass.
 
@@ -63,14 +72,12 @@ def settle(
         s.
     count : int
         Number of steps.
-    damping : float
-        Force against the velocity over mass, 1/s.
     frame : (3, 3) array
         Workspace.
     local : (9,) array
         Workspace.
     """
-    keep = 1.0 - damping * step
+    keep = 1.0 - DAMPING * step
     for _ in range(count):
         clear_loads(nodes)
         for e in range(shells.node.shape[0]):

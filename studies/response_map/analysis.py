@@ -12,7 +12,7 @@ from mcstudy import statistics
 from mcstudy.statistics import Estimate
 from mcstudy.studyfile.study_outputs import report_outputs
 from mcstudy.typed_json import Real
-from models.protocol import Model, complete_status
+from models.protocol import Model
 from studies.response_map.grid import MapPoint, map_points
 from studies.response_map.schema import MapStudy
 from studies.runs import RunEnds, check_failure_rate
@@ -138,8 +138,7 @@ def analyse(study: MapStudy, model: Model, runs: pd.DataFrame) -> MapAnalysis:
     axes = {**study.panels, **study.axes}
     points = map_points(study, model)
     described = _Described(study.kind, {**axes, **study.inputs}, study.max_failure_rate)
-    ended, _ = check_failure_rate(described, model, runs)
-    complete = runs["status"].isin(complete_status(model)).to_numpy(dtype=bool)
+    ended, complete = check_failure_rate(described, model, runs)
     draws = len(runs) // len(points)
     # Samples of a design with replicates are not independent.
     groups = None
@@ -209,8 +208,9 @@ def _bands(
     for label, own in panels_of(study, points).items():
         part = table[:, own]
         valid = np.isfinite(part).sum(axis=1)
-        part, valid = part[valid > 0], valid[valid > 0]
-        held = None if groups is None else groups[np.isfinite(table[:, own]).any(axis=1)]
+        kept = valid > 0
+        part, valid = part[kept], valid[kept]
+        held = None if groups is None else groups[kept]
         bands = []
         for low, high in itertools.pairwise(edges):
             shares = ((part > low) & (part <= high)).sum(axis=1) / valid

@@ -134,6 +134,7 @@ def _compile(
         "fastmath": {"contract"} if fuse else False,
         "forceinline": inline,
         "_nrt": False,
+        "no_cfunc_wrapper": True,
     }
     compiled: Any = numba.njit(**flags)(function)
     if _CACHED:

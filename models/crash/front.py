@@ -81,6 +81,7 @@ FRONTS[SheetFront] = FRONTS[FacetFront]._replace(
     prepare=sheet_front.sheet_prepare,
     carry=sheet_front.sheet_carry,
     may_touch=sheet_front.sheet_may_touch,
+    separation_of=sheet_front.sheet_separation,
 )
 """Functions of each front geometry, by its type; a sheet answers as facets but for its own."""
 

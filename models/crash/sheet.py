@@ -1,118 +1,87 @@
-"""A sheet of shells that bodies press on: its motion between two poses of the bodies.
+"""Shells of a car's front in a crash: their state, what bodies do to them, and their film."""
 
-The bodies' surfaces move straight from pose to pose, in some tens of the sheet's own steps; the
-impulses on them, over the time between, are the loads that they feel. A stiff body (the head)
-presses by an elastic foundation, any other by the law of its flesh at its deepest node, shared out
-over the nodes by their depth and area.
-"""
-
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from models.compilation import inlined_kernel
-from models.contact.friction import SLIP_VELOCITY, STICKING
-from models.crash.surfaces import law_force
-from models.shells.element import update_element
-from models.shells.explicit import advance, clear_loads
-from models.shells.material import Materials
-from models.shells.parts import Gaps, Supports, Ties, apply_parts
-from models.shells.state import Nodes, Shells
+from models.shells.assembly import NODES, TOUCHED, Assembly
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-MARGIN = 0.03
-"""Distance (m) between poses within which a node can come into contact (assumed, far more than the
-travel of a step)."""
-AWAKE = 0.03
-"""Distance (m) of a body from the sheet's plane at which the sheet begins to be stepped."""
-ASLEEP = 0.02
-"""Time (s) without a load after which the sheet is stepped no more (assumed)."""
-LIGHT = 30.0
-"""Force (N) on a segment below which the sheet counts as free of it (assumed): a limb that drags
-over the hood does not dent it."""
-
+SHOT, SHOTS = 2e-3, 150
+"""Time (s) between the pictures of a film, and their largest number; the last one stays."""
 # Entries of the clock.
-NOW, RUNNING, LAST_CONTACT, STEPS = range(4)
-# Entries of the account (J): the work of the bodies on the sheet, friction, kinetic, parts.
-WORK, SLID, MOVING, PARTS = range(4)
+NOW, STEPS, TAKEN = range(3)
+# States of a group.
+FRESH, STEPPED, RESTING = range(3)
+# Entries of the account (J): work of the bodies on the shells awake, friction, motion stopped.
+WORK, SLID, STOPPED = range(3)
 
 
 class Sheet(NamedTuple):
-    """A sheet, its supports and its state, in the frame of the static car.
+    """Shells in the frame of the static car, and what bodies do to them.
 
     Attributes
     ----------
-    nodes : Nodes
-    shells : Shells
-    materials : Materials
-    start : (n, 3) array
-        Places of the nodes at rest, m.
-    ties, gaps, supports
-        See ``models.shells.parts``.
-    touched : (t,) array of int
-        Nodes that bodies can touch.
-    area : (t,) array
-        Area about each, m2.
+    body : Assembly
+        The shells.
     pressed : (t, 3) array
-        Force of the bodies on each at present, N.
-    box : (2, 3) array
-        Corners of the space in which bodies wake the sheet, m.
-    normal : (3,) array
-        Outward normal of the sheet's plane.
+        Force of the bodies on each touched node at present, N.
+    group : (t,) array of int
+        Group of each touched node.
+    box : (groups, 2, 3) array
+        Corners of the space of each group, m.
     foundation : (n,) array
         Elastic foundation of each segment, Pa/m; 0 for the law of its flesh.
-    step : float
-        Largest step, s.
-    clock : (4,) array
-        Time reached (s), whether it runs, time of the last contact (s), steps.
+    clock : (3,) array
+        Time reached (s), steps, pictures of the film.
+    state : (groups,) array of int
+        FRESH, STEPPED or RESTING.
+    mean : (groups,) array
+        Mean force of the bodies, N.
     past, present : (n, 12) array
         Centres and rotations of the segments at both poses.
     turn : (3, 3) array
         Workspace.
-    candidate : (n, c) array of int
-        Entries of ``touched`` that a segment can touch until the next pose.
+    candidate : (n, t) array of int
+        Touched nodes that a segment can touch until the next pose.
     number : (n,) array of int
         Number of them.
-    depth : (c,) array
+    depth : (t,) array
         Workspace.
-    impulse : (n, 10) array
-        Force, torque about the centre, normal force and its size, as sums over the steps and then
-        means, N and N m.
-    place : (n, 4) array
+    impulse : (n, regions, 10) array
+        Force, torque about the centre, normal force and its size, by segment and region, as sums
+        over the steps and then means, N and N m.
+    place : (n, regions, 4) array
         Sum of the normal force times the place of contact, and of the force.
+    load : (n, groups) array
+        Sum of the normal forces on each group over the steps, N.
     largest : (n,) array
-        Largest depth of a segment in the sheet's surface so far, m.
+        Largest depth of a segment in the shells' surface so far, m.
     sunk : (n,) array
-        Largest depth so far with the displacement of the sheet, m.
-    account : (4,) array
+        Largest depth so far with the displacement of the shells, m.
+    sunk_at : (n,) array of int
+        Touched node at which that was.
+    account : (3,) array
         J.
     lowest : (t,) array
-        Largest displacement of each node into the car, m.
-    frame : (3, 3) array
-        Workspace.
-    local : (9,) array
-        Workspace.
+        Largest displacement of each touched node into the car, m.
+    film : (f, t, 3) array of float32
+        Displacements of the touched nodes at times, m.
+    film_time : (f,) array
+        s.
     """
 
-    nodes: Nodes
-    shells: Shells
-    materials: Materials
-    start: Array
-    ties: Ties
-    gaps: Gaps
-    supports: Supports
-    touched: Index
-    area: Array
+    body: Assembly
     pressed: Array
+    group: Index
     box: Array
-    normal: Array
     foundation: Array
-    step: float
     clock: Array
+    state: Index
+    mean: Array
     past: Array
     present: Array
     turn: Array
@@ -121,232 +90,64 @@ class Sheet(NamedTuple):
     depth: Array
     impulse: Array
     place: Array
+    load: Array
     largest: Array
     sunk: Array
+    sunk_at: Index
     account: Array
     lowest: Array
-    frame: Array
-    local: Array
+    film: NDArray[np.float32]
+    film_time: Array
 
 
-@inlined_kernel
-def is_near_sheet(sheet, reach):
-    """Return whether a segment of the present pose is within reach of the sheet.
+def build_sheet(body: Assembly, foundation: Array, regions: int) -> Sheet:
+    """Return shells at rest that bodies press on.
+
+    Parameters
+    ----------
+    body : Assembly
+    foundation : (n,) array
+        Elastic foundation of each segment, Pa/m; 0 for the law of its flesh.
+    regions : int
+        Number of the car's zones.
+    """
+    segments, groups, touched = len(foundation), len(body.awake), len(body.touched)
+    first = body.first[NODES]
+    spaces = [body.start[first[g] : first[g + 1]] for g in range(groups)]
+    return Sheet(
+        body=body, pressed=np.zeros((touched, 3)),
+        group=np.repeat(np.arange(groups), np.diff(body.first[TOUCHED])),
+        box=np.array([[space.min(axis=0), space.max(axis=0)] for space in spaces]),
+        foundation=foundation, clock=np.zeros(3), state=np.zeros(groups, dtype=np.int64),
+        mean=np.zeros(groups), past=np.zeros((segments, 12)), present=np.zeros((segments, 12)),
+        turn=np.zeros((3, 3)), candidate=np.zeros((segments, touched), dtype=np.int64),
+        number=np.zeros(segments, dtype=np.int64), depth=np.zeros(touched),
+        impulse=np.zeros((segments, regions, 10)), place=np.zeros((segments, regions, 4)),
+        load=np.zeros((segments, groups)), largest=np.zeros(segments), sunk=np.zeros(segments),
+        sunk_at=np.zeros(segments, dtype=np.int64), account=np.zeros(3), lowest=np.zeros(touched),
+        film=np.zeros((SHOTS, touched, 3), dtype=np.float32), film_time=np.zeros(SHOTS),
+    )  # fmt: skip
+
+
+def booked_energy(sheet: Sheet) -> float:
+    """Return all energy that the shells have taken in, J."""
+    body = sheet.body
+    return float(
+        body.shells.energy.sum() + body.moving.sum() + body.stored.sum() + sheet.account[STOPPED]
+    )
+
+
+def shapes_at(sheet: Sheet, time: Array) -> Array:
+    """Return the places (f, t, 3) of the touched nodes at times, in m.
 
     Parameters
     ----------
     sheet : Sheet
-    reach : (n,) array
-        Largest distance of the segments' surfaces from their centres, m.
-    """
-    for i in range(reach.shape[0]):
-        near = True
-        height = 0.0
-        for k in range(3):
-            c = sheet.present[i, k]
-            near &= sheet.box[0, k] - reach[i] < c < sheet.box[1, k] + reach[i]
-            height += sheet.normal[k] * (c - sheet.start[0, k])
-        if near and abs(height) < reach[i] + AWAKE:
-            return True
-    return False
-
-
-@inlined_kernel
-def find_candidates(sheet, reach):
-    """List the nodes that each segment can touch until the next pose."""
-    for i in range(reach.shape[0]):
-        found = 0
-        limit = (reach[i] + MARGIN) ** 2
-        for t in range(sheet.touched.shape[0]):
-            n = sheet.touched[t]
-            square = 0.0
-            for k in range(3):
-                square += (sheet.nodes.position[n, k] - sheet.present[i, k]) ** 2
-            if square < limit:
-                sheet.candidate[i, found] = t
-                found += 1
-        sheet.number[i] = found
-
-
-@inlined_kernel
-def _press(sheet, ellipsoids, i, law, mu, share, span, spin, step):
-    """Press a segment, at a share of the way between its poses, on the sheet.
-
-    ``span`` is the time between the poses, ``spin`` (3,) the segment's angular velocity.
-    """
-    past, present, nodes = sheet.past, sheet.present, sheet.nodes
-    keep = 1.0 - share
-    cx = keep * past[i, 0] + share * present[i, 0]
-    cy = keep * past[i, 1] + share * present[i, 1]
-    cz = keep * past[i, 2] + share * present[i, 2]
-    ux = (present[i, 0] - past[i, 0]) / span
-    uy = (present[i, 1] - past[i, 1]) / span
-    uz = (present[i, 2] - past[i, 2]) / span
-    R = sheet.turn
-    for a in range(3):
-        for b in range(3):
-            R[a, b] = keep * past[i, 3 + 3 * a + b] + share * present[i, 3 + 3 * a + b]
-    sa, sb, sc = ellipsoids.square[i, 0], ellipsoids.square[i, 1], ellipsoids.square[i, 2]
-    deepest, total, closing = 0.0, 0.0, 0.0
-    for m in range(sheet.number[i]):
-        t = sheet.candidate[i, m]
-        n = sheet.touched[t]
-        sheet.depth[m] = 0.0
-        dx, dy, dz = (
-            nodes.position[n, 0] - cx,
-            nodes.position[n, 1] - cy,
-            nodes.position[n, 2] - cz,
-        )
-        qa = R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * dz
-        qb = R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * dz
-        qc = R[0, 2] * dx + R[1, 2] * dy + R[2, 2] * dz
-        level = qa * qa / sa + qb * qb / sb + qc * qc / sc
-        if level >= 1.0 or level < 0.01:
-            continue
-        size = math.sqrt(level)
-        slope = math.sqrt((qa / sa) ** 2 + (qb / sb) ** 2 + (qc / sc) ** 2) / size
-        depth = (1.0 - size) / slope
-        sheet.depth[m] = depth
-        total += sheet.area[t] * depth
-        if depth > deepest:
-            deepest = depth
-            # Outward normal of the body, and how fast the node goes deeper.
-            ga, gb, gc = qa / sa, qb / sb, qc / sc
-            g = 1.0 / math.sqrt(ga * ga + gb * gb + gc * gc)
-            nx = g * (R[0, 0] * ga + R[0, 1] * gb + R[0, 2] * gc)
-            ny = g * (R[1, 0] * ga + R[1, 1] * gb + R[1, 2] * gc)
-            nz = g * (R[2, 0] * ga + R[2, 1] * gb + R[2, 2] * gc)
-            closing = (
-                (ux + spin[1] * dz - spin[2] * dy - nodes.velocity[n, 0]) * nx
-                + (uy + spin[2] * dx - spin[0] * dz - nodes.velocity[n, 1]) * ny
-                + (uz + spin[0] * dy - spin[1] * dx - nodes.velocity[n, 2]) * nz
-            )
-    if deepest == 0.0:
-        return
-    sheet.largest[i] = max(sheet.largest[i], deepest)
-    stiff = sheet.foundation[i]
-    if stiff == 0.0:
-        elastic, viscous = law_force(ellipsoids, law, deepest, closing, sheet.largest[i])
-        stiff = (elastic + viscous) / total
-    for m in range(sheet.number[i]):
-        depth = sheet.depth[m]
-        if depth == 0.0:
-            continue
-        t = sheet.candidate[i, m]
-        n = sheet.touched[t]
-        dx, dy, dz = (
-            nodes.position[n, 0] - cx,
-            nodes.position[n, 1] - cy,
-            nodes.position[n, 2] - cz,
-        )
-        ga = (R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * dz) / sa
-        gb = (R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * dz) / sb
-        gc = (R[0, 2] * dx + R[1, 2] * dy + R[2, 2] * dz) / sc
-        g = 1.0 / math.sqrt(ga * ga + gb * gb + gc * gc)
-        nx = g * (R[0, 0] * ga + R[0, 1] * gb + R[0, 2] * gc)
-        ny = g * (R[1, 0] * ga + R[1, 1] * gb + R[1, 2] * gc)
-        nz = g * (R[2, 0] * ga + R[2, 1] * gb + R[2, 2] * gc)
-        # Velocity of the body's point against the node.
-        sx = ux + spin[1] * dz - spin[2] * dy - nodes.velocity[n, 0]
-        sy = uy + spin[2] * dx - spin[0] * dz - nodes.velocity[n, 1]
-        sz = uz + spin[0] * dy - spin[1] * dx - nodes.velocity[n, 2]
-        rate = sx * nx + sy * ny + sz * nz
-        push = stiff * sheet.area[t] * depth
-        if push <= 0.0:
-            continue
-        sx, sy, sz = sx - rate * nx, sy - rate * ny, sz - rate * nz
-        slip = sx * sx + sy * sy + sz * sz
-        drag = mu * push / math.sqrt(slip + SLIP_VELOCITY * SLIP_VELOCITY)
-        drag = min(drag, STICKING * nodes.mass[n] / step)
-        moved = depth
-        for k in range(3):
-            moved -= sheet.normal[k] * (nodes.position[n, k] - sheet.start[n, k])
-        sheet.sunk[i] = max(sheet.sunk[i], moved)
-        # On the node; the body takes the opposite.
-        fx, fy, fz = push * nx + drag * sx, push * ny + drag * sy, push * nz + drag * sz
-        nodes.force[n, 0] += fx
-        nodes.force[n, 1] += fy
-        nodes.force[n, 2] += fz
-        sheet.pressed[t, 0] += fx
-        sheet.pressed[t, 1] += fy
-        sheet.pressed[t, 2] += fz
-        sheet.account[SLID] += step * drag * slip
-        J = sheet.impulse
-        J[i, 0] -= fx
-        J[i, 1] -= fy
-        J[i, 2] -= fz
-        J[i, 3] -= dy * fz - dz * fy
-        J[i, 4] -= dz * fx - dx * fz
-        J[i, 5] -= dx * fy - dy * fx
-        J[i, 6] -= push * nx
-        J[i, 7] -= push * ny
-        J[i, 8] -= push * nz
-        sheet.place[i, 0] += push * nodes.position[n, 0]
-        sheet.place[i, 1] += push * nodes.position[n, 1]
-        sheet.place[i, 2] += push * nodes.position[n, 2]
-        sheet.place[i, 3] += push
-
-
-@inlined_kernel
-def follow_bodies(sheet, ellipsoids, mu, spins, time):
-    """Step the sheet from its own time to another while the bodies move between their poses.
-
-    Parameters
-    ----------
-    sheet : Sheet
-        ``impulse`` becomes the mean loads on the segments.
-    ellipsoids : Ellipsoids
-        Surfaces of the segments and the laws of their flesh.
-    mu : float
-        Coefficient of friction.
-    spins : (n, 3) array
-        Angular velocities of the segments, frame of the sheet, rad/s.
-    time : float
+    time : (f,) array
         s.
     """
-    span = time - sheet.clock[NOW]
-    count = max(math.ceil(span / sheet.step), 1)
-    step = span / count
-    segments = sheet.number.shape[0]
-    road = ellipsoids.surface_law.shape[1] - 1
-    for k in range(count):
-        clear_loads(sheet.nodes)
-        for e in range(sheet.shells.node.shape[0]):
-            update_element(
-                sheet.nodes, sheet.shells, sheet.materials, e, step, sheet.frame, sheet.local
-            )
-        sheet.account[PARTS] = apply_parts(
-            sheet.nodes, sheet.start, sheet.ties, sheet.gaps, sheet.supports
-        )
-        for t in range(sheet.touched.shape[0]):
-            for j in range(3):
-                sheet.pressed[t, j] = 0.0
-        for i in range(segments):
-            if sheet.number[i] > 0:
-                _press(
-                    sheet, ellipsoids, i, ellipsoids.surface_law[i, road], mu,
-                    (k + 1.0) / count, span, spins[i], step,
-                )  # fmt: skip
-        sheet.account[MOVING] = advance(sheet.nodes, step, step)
-        for t in range(sheet.touched.shape[0]):
-            n = sheet.touched[t]
-            for j in range(3):
-                # Velocity at the time of the force: half of its change lies before it.
-                change = step * sheet.nodes.force[n, j] / sheet.nodes.mass[n]
-                mean = sheet.nodes.velocity[n, j] - 0.5 * change
-                sheet.account[WORK] += step * sheet.pressed[t, j] * mean
-    sheet.clock[STEPS] += count
-    for i in range(segments):
-        for j in range(9):
-            sheet.impulse[i, j] /= count
-        sheet.impulse[i, 9] = math.sqrt(
-            sheet.impulse[i, 6] ** 2 + sheet.impulse[i, 7] ** 2 + sheet.impulse[i, 8] ** 2
-        )
-        if sheet.impulse[i, 9] > LIGHT:
-            sheet.clock[LAST_CONTACT] = time
-    for t in range(sheet.touched.shape[0]):
-        n = sheet.touched[t]
-        moved = 0.0
-        for k in range(3):
-            moved -= sheet.normal[k] * (sheet.nodes.position[n, k] - sheet.start[n, k])
-        sheet.lowest[t] = max(sheet.lowest[t], moved)
+    taken = int(sheet.clock[TAKEN])
+    row = np.searchsorted(sheet.film_time[:taken], time, side="right") - 1
+    start = sheet.body.start[sheet.body.touched]
+    moved = np.where((row < 0)[:, None, None], 0.0, sheet.film[np.maximum(row, 0)])
+    return np.asarray(start + moved)

@@ -27,9 +27,9 @@ from models.pedestrian.skin import (
     segment_mesh,
 )
 from models.protocol import Mesh
+from models.vehicle.car import load_car
 from models.vehicle.profile import dive_shift, diving_points, static_point
-from models.vehicle.surface.car import load_car
-from models.vehicle.surface.field import distances
+from models.vehicle.surface.field import DistanceField, distances
 from models.vehicle.surface.generator import laws_of_regions
 from models.vehicle.surface.mesh import SurfaceMesh
 from models.vehicle.surface.store import load_field
@@ -100,7 +100,7 @@ class FacetModel(MultibodyModel):
             raise ValueError("load: ellipsoids have no points that share it; choose 'deepest'")
         if body and child == "ellipsoids":
             raise ValueError("body: its meshes are facets; choose child 'facets'")
-        car = load_car(vehicle)
+        self.car = car = load_car(vehicle)
         super().__init__(car.vehicle.name, tick, channel_class, angular_class, effects, hood_curve)
         self._own = load_body_meshes(body) if body else None
         own = [car.digest, self._own.digest if self._own else ""]
@@ -110,8 +110,8 @@ class FacetModel(MultibodyModel):
             self._subdivisions[row] = max(int(subdivisions), FINE)
         self._bare = child == "ellipsoids"
         self._distributed = np.array([float(load == "distributed")])
-        self.mesh = self._regions_of(car.mesh)
-        self._field = load_field(self.mesh, laws_of_regions(self.vehicle, self.mesh))
+        self.mesh = car.mesh
+        self._field = self._field_of(car.mesh)
         self._found = empty_findings(len(self.vehicle.zones))
 
     def front_of(self, scenario: Scenario) -> FacetFront:
@@ -127,9 +127,9 @@ class FacetModel(MultibodyModel):
             found=self._found,
         )
 
-    def _regions_of(self, mesh: SurfaceMesh) -> SurfaceMesh:
-        """Return the car's mesh with the regions that this model gives it."""
-        return mesh
+    def _field_of(self, mesh: SurfaceMesh) -> DistanceField:
+        """Return the distance field of the car."""
+        return load_field(mesh, laws_of_regions(self.vehicle, mesh))
 
     def _skin(self, body: Body) -> Skin:
         """Return the surface of a body."""

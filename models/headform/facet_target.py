@@ -33,7 +33,7 @@ from models.headform.target import (
 from models.multibody.tree import Motion, empty_loads, empty_motion
 from models.pedestrian.skin import FINE, Skin, build_skin
 from models.protocol import Input
-from models.vehicle.surface.car import load_car
+from models.vehicle.car import load_car
 from models.vehicle.surface.field import distances
 from models.vehicle.surface.wrap import wrap_point
 

@@ -22,11 +22,12 @@ from models.headform.shell_impact import (
 )
 from models.headform.target import SAMPLING_RATE, Strike, impact_axes
 from models.protocol import Input
-from models.shells.explicit import build_shells, stable_step
-from models.shells.hood_mesh import OUTER, HoodMesh, build_hood, check_size, hood_table, outer_areas
+from models.shells.assembly import TOUCHED, Assembly
 from models.shells.settling import dent_near, settle, settling_steps
-from models.vehicle.profile import load_vehicle
-from models.vehicle.surface.generator import generate_surface
+from models.vehicle.car import load_car
+from models.vehicle.structure.build import structure_table
+from models.vehicle.structure.change import Change
+from models.vehicle.structure.panel import Structure
 from models.vehicle.surface.wrap import wrap_point
 
 Array = NDArray[np.float64]
@@ -46,17 +47,22 @@ _SHARED = ("impact_speed", "headform_mass", "headform_diameter", "friction_body_
 _FROM_FACETS = ("wrap_around_distance", "lateral_position", "impact_elevation")
 
 
+NEAR = 0.1
+"""Distance (m) of a group of shells from the headform up to which it is stepped (assumed): farther
+ones would not be touched."""
+
+
 class FemTarget:
-    """The hood of a vehicle as two sheets of shells with ribs, ties and supports.
+    """The front of a vehicle as shells: a hood of two sheets with ribs, and panels around it.
 
     Parameters
     ----------
     nominal : mapping of str to float
         Nominal values of the headform's inputs.
     vehicle : str, optional
-        By default the family car.
+        Name of a vehicle, or path of a car file with a deck of shells; by default the family car.
     size : float
-        Size of the elements, m.
+        Size of the generated elements, m.
 
     Raises
     ------
@@ -73,13 +79,14 @@ class FemTarget:
     )
 
     def __init__(self, nominal: Mapping[str, float], vehicle: str | None, size: float) -> None:
-        check_size(size)
-        self.vehicle = load_vehicle(vehicle or "family_car_1990s")
-        table = hood_table(self.vehicle.name)
+        self.car = load_car(vehicle or "family_car_1990s")
+        self.vehicle, self.mesh = self.car.vehicle, self.car.mesh
         self.size = size
-        self.digest = f"+fem{table['version']}"
-        self._foundation = float(table["headform_skin"]["foundation"])
-        self.mesh = generate_surface(self.vehicle.name)
+        # Refuses a car without shells, and a size out of range.
+        self.car.structure(size, Change())
+        version = self.car.digest or structure_table(self.vehicle.name)["version"]
+        self.digest = f"+fem{version}"
+        self._foundation = float(_TABLE["fem"]["foundation"])
         shared = {item.name: item for item in read_inputs(_TABLE)}
         facet = {item.name: item for item in read_inputs(_TABLE["facet"])}
         items = [
@@ -108,18 +115,19 @@ class FemTarget:
         """
         raise ValueError("a hood of finite elements has no loading curve; fit one to its pulses")
 
-    def hood(self, values: Mapping[str, float]) -> HoodMesh:
-        """Return the mesh for the inputs.
+    def structure(self, values: Mapping[str, float]) -> Structure:
+        """Return the shells for the inputs.
 
         Parameters
         ----------
         values : mapping of str to float
             All inputs by name.
         """
-        return build_hood(
-            self.vehicle, self.size, rib=values["rib_depth"], sheet=values["sheet_thickness"],
-            strength=values["yield_stress"],
+        change = Change(
+            sheet=values["sheet_thickness"], strength=values["yield_stress"],
+            rib=values["rib_depth"],
         )  # fmt: skip
+        return self.car.structure(self.size, change)
 
     def strike(
         self, values: Mapping[str, float], chain: EffectChain, impactor: Impactor
@@ -135,43 +143,37 @@ class FemTarget:
         impactor : Impactor
             The headform.
         """
-        hood = self.hood(values)
         aim = wrap_point(self.mesh, values["wrap_around_distance"], values["lateral_position"])
         if not np.isfinite(aim).all():
             return None
+        body = self.structure(values).assemble()
+        start = body.start[body.touched]
+        outward = body.normal[int(np.argmin(np.linalg.norm(start - aim, axis=1)))]
         down = values["impact_elevation"]
         heading = np.array([-math.cos(down), 0.0, -math.sin(down)])
-        touched = np.flatnonzero(hood.sheet == OUTER)
-        centre = _place(aim + impactor.radius * hood.normal, heading, hood.position[touched],
-                        impactor.radius)  # fmt: skip
-        if centre is None or heading @ hood.normal >= 0.0:
+        centre = _place(aim + impactor.radius * outward, heading, start, impactor.radius)
+        if centre is None or heading @ outward >= 0.0:
             return None
-        nodes, shells = build_shells(
-            hood.position, hood.elements, hood.thickness, hood.material, hood.materials
-        )
-        stride = math.ceil(1.0 / (SAMPLING_RATE * stable_step(shells, hood.materials)))
+        awake = _wake(body, centre, impactor.radius + NEAR)
+        stride = math.ceil(1.0 / (SAMPLING_RATE * body.step))
         step = 1.0 / (SAMPLING_RATE * stride)
         velocity = values["impact_speed"] * heading
-        axes = impact_axes(hood.normal, heading)
+        axes = impact_axes(outward, heading)
         record = np.empty((round(LONGEST * SAMPLING_RATE), FACET_COLUMNS))
         summary, balance = np.zeros(SUMMARY), np.zeros(BALANCE)
         speeds = (float(-velocity @ axes[0]), float(velocity @ axes[1]))
-        parts = (hood.ties, hood.gaps, hood.supports)
-        work = (np.zeros((3, 3)), np.zeros(9))
         lowest = np.zeros(2)
         strike_shells(
-            nodes, shells, hood.materials, hood.position, *parts, touched,
-            self._foundation * outer_areas(hood, shells)[touched], values["friction_body_car"],
+            body, self._foundation * np.where(awake, body.area, 0.0), values["friction_body_car"],
             impactor.mass, impactor.inertia, impactor.radius, centre, velocity, np.zeros(3), axes,
-            step, stride, LEAVING, np.zeros(9), *work, record, balance, summary, lowest,
+            step, stride, LEAVING, np.zeros(9), record, balance, summary, lowest,
         )  # fmt: skip
         kept = record[: int(summary[SAMPLES])].copy()
         if not np.any(kept[:, NORMAL]):
             return None
         if not math.isnan(summary[END_TIME]):
-            settle(nodes, shells, hood.materials, hood.position, *parts, step,
-                   settling_steps(step), *work)  # fmt: skip
-        dent, _ = dent_near(hood.position[touched], nodes.position[touched], hood.normal, aim)
+            settle(body, step, settling_steps(step))
+        dent, _ = dent_near(body, aim)
         internal = float(balance[INTERNAL])
         return Strike(
             speeds=speeds,
@@ -186,6 +188,17 @@ class FemTarget:
 def _end(record: Array) -> int:
     """Return the number of samples up to the last one with a force, and one more."""
     return min(int(np.flatnonzero(record[:, NORMAL])[-1]) + 2, len(record))
+
+
+def _wake(body: Assembly, centre: Array, reach: float) -> NDArray[np.bool_]:
+    """Wake the groups with a node within reach of a point, and return which nodes (t,) are theirs.
+
+    ``reach`` is in m.
+    """
+    near = np.linalg.norm(body.start[body.touched] - centre, axis=1) < reach
+    group = np.repeat(np.arange(len(body.awake)), np.diff(body.first[TOUCHED]))
+    body.awake[np.unique(group[near])] = True
+    return np.asarray(body.awake[group])
 
 
 def _place(centre: Array, heading: Array, points: Array, radius: float) -> Array | None:

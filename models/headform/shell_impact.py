@@ -24,9 +24,7 @@ from models.headform.impact import (
     SPIN,
     TANGENTIAL,
 )
-from models.shells.element import update_element
-from models.shells.explicit import advance, clear_loads
-from models.shells.parts import apply_parts
+from models.shells.assembly import displacement_of, load_groups, move_groups
 
 # Places of the energy balance (J); the last is the sum of the elements' four.
 KINETIC, SECTION, SHEAR, BOW, DRILL, PARTS, SKIN, FRICTION, HEADFORM, INTERNAL = range(10)
@@ -46,7 +44,7 @@ def press_sphere(
     touched : (t,) array of int
         Nodes that the sphere can touch.
     foundation : (t,) array
-        Stiffness of the sphere's skin over each node's area, N/m.
+        Stiffness of the sphere's skin over each node's area, N/m; 0 for a node that it passes.
     friction : float
         Coefficient of friction.
     centre, velocity, spin : (3,) array
@@ -67,6 +65,8 @@ def press_sphere(
     for j in range(9):
         load[j] = 0.0
     for i in range(touched.shape[0]):
+        if foundation[i] == 0.0:
+            continue
         n = touched[i]
         dx = nodes.position[n, 0] - centre[0]
         if abs(dx) >= radius:
@@ -110,21 +110,16 @@ def press_sphere(
 
 @kernel
 def strike_shells(
-    nodes, shells, materials, start, ties, gaps, supports, touched, foundation, friction,
-    mass, inertia, radius, centre, velocity, spin, axes, step, stride, least,
-    load, frame, local, record, balance, summary, lowest,
+    body, foundation, friction, mass, inertia, radius, centre, velocity, spin, axes, step, stride,
+    least, load, record, balance, summary, lowest,
 ):  # fmt: skip
     """Step from first contact until the headform has left the sheet.
 
     Parameters
     ----------
-    nodes, shells, materials
-        The mesh; changed.
-    start : (n, 3) array
-        Places of the nodes at rest, m.
-    ties, gaps, supports
-        See ``models.shells.parts``.
-    touched, foundation, friction
+    body : Assembly
+        The shells; those awake are changed, and only they are touched.
+    foundation, friction
         See ``press_sphere``.
     mass, inertia, radius : float
         Of the headform, kg, kg m2 and m.
@@ -140,39 +135,29 @@ def strike_shells(
         Time (s) without contact after which the headform has left: the sheet may come after it.
     load : (9,) array
         Workspace.
-    frame : (3, 3) array
-        Workspace.
-    local : (9,) array
-        Workspace.
     record : (samples, FACET_COLUMNS) array
         Filled, as in ``models.headform.facet_impact``; penetration is the headform's own travel.
     balance : (BALANCE,) array
         Filled: energy by place, J.
     lowest : (2,) array
-        Filled: largest displacement of a node against the normal and its time, m and s.
+        Filled: largest displacement of a node into the car and its time, m and s.
     summary : (SUMMARY,) array
         Filled; END_TIME is NaN if the record is full before the contact ends.
     """
     samples, free, deepest, slid = 0, 0.0, 0.0, 0.0
-    travel, stored, skin, moving = 0.0, 0.0, 0.0, 0.0
+    travel, skin = 0.0, 0.0
+    nodes, shells = body.nodes, body.shells
     ended = math.nan
     summary[END_TIME] = math.nan
     for k in range(record.shape[0] * stride + 1):
-        clear_loads(nodes)
-        for e in range(shells.node.shape[0]):
-            update_element(nodes, shells, materials, e, step, frame, local)
-        stored = apply_parts(nodes, start, ties, gaps, supports)
+        load_groups(body, step)
         skin, power = press_sphere(
-            nodes, touched, foundation, friction, centre, velocity, spin, radius, step,
-            load,
-        )  # fmt: skip
+            nodes, body.touched, foundation, friction, centre, velocity, spin, radius, step, load
+        )
         slid += step * power
         if k % stride == 0:
-            for i in range(touched.shape[0]):
-                n = touched[i]
-                moved = 0.0
-                for a in range(3):
-                    moved -= axes[0, a] * (nodes.position[n, a] - start[n, a])
+            for i in range(body.touched.shape[0]):
+                moved = displacement_of(body, i)
                 if moved > lowest[0]:
                     lowest[0], lowest[1] = moved, k * step
         touching = load[6] != 0.0 or load[7] != 0.0 or load[8] != 0.0
@@ -202,7 +187,7 @@ def strike_shells(
         if k > 0 and free > least:
             summary[END_TIME] = ended
             break
-        moving = advance(nodes, step, before)
+        move_groups(body, step, before)
         for a in range(3):
             velocity[a] += before * load[a] / mass
             spin[a] += before * load[3 + a] / inertia
@@ -218,10 +203,10 @@ def strike_shells(
     summary[REBOUND] = normal
     summary[END_SLIDE] = math.sqrt(max(square - normal * normal, 0.0))
     summary[END_SPIN] = math.sqrt(spin[0] ** 2 + spin[1] ** 2 + spin[2] ** 2)
-    balance[KINETIC] = moving
+    balance[KINETIC] = body.moving.sum()
     for j in range(4):
         balance[SECTION + j] = shells.energy[j]
-    balance[PARTS] = stored
+    balance[PARTS] = body.stored.sum()
     balance[SKIN] = skin
     balance[FRICTION] = slid
     balance[HEADFORM] = 0.5 * mass * square + 0.5 * inertia * summary[END_SPIN] ** 2

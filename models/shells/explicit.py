@@ -122,16 +122,16 @@ def stable_step(shells: Shells, materials: Materials) -> float:
 
 
 @inlined_kernel
-def clear_loads(nodes):
-    """Set forces and moments of all nodes to zero."""
-    for n in range(nodes.mass.shape[0]):
+def clear_loads(nodes, begin, end):
+    """Set forces and moments of a range of nodes to zero."""
+    for n in range(begin, end):
         for k in range(3):
             nodes.force[n, k] = 0.0
             nodes.moment[n, k] = 0.0
 
 
 @inlined_kernel
-def advance(nodes, step, before):
+def advance(nodes, begin, end, step, before):
     """Advance velocities over a step and positions with them, and return the kinetic energy (J).
 
     The energy is that at the time of the forces, from the velocities before and after it: with it
@@ -140,13 +140,15 @@ def advance(nodes, step, before):
     Parameters
     ----------
     nodes : Nodes
+    begin, end : int
+        Range.
     step : float
         Time from one position to the next, s.
     before : float
         Time from the velocities, at the middle of the last step, to those of this one, s.
     """
     energy = 0.0
-    for n in range(nodes.mass.shape[0]):
+    for n in range(begin, end):
         push, turn = before / nodes.mass[n], before / nodes.inertia[n]
         for k in range(3):
             if nodes.held[n, k]:
@@ -186,6 +188,6 @@ def internal_forces(nodes, shells, materials, step, frame, local):
     local : (9,) array
         Workspace.
     """
-    clear_loads(nodes)
+    clear_loads(nodes, 0, nodes.mass.shape[0])
     for e in range(shells.node.shape[0]):
         update_element(nodes, shells, materials, e, step, frame, local)

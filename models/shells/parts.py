@@ -28,7 +28,7 @@ class Ties(NamedTuple):
 
 
 class Gaps(NamedTuple):
-    """Gaps that carry pressure once they are closed.
+    """Gaps that carry pressure once they are closed, and may keep a part of what they were pressed.
 
     Attributes
     ----------
@@ -38,7 +38,11 @@ class Gaps(NamedTuple):
         Approach along the normal at which the gap closes, m.
     stiffness : (g,) array
         N/m.
-    normal : (3,) array
+    unloading : (g,) array
+        Stiffness in unloading over that in loading; 1 for an elastic structure.
+    deepest : (g,) array
+        Largest approach beyond the clearance so far, m.
+    normal : (g, 3) array
         From lower to upper.
     """
 
@@ -46,6 +50,8 @@ class Gaps(NamedTuple):
     lower: Index
     clearance: Array
     stiffness: Array
+    unloading: Array
+    deepest: Array
     normal: Array
 
 
@@ -62,8 +68,8 @@ class Supports(NamedTuple):
         N/m.
     stop : (s,) array of bool
         Whether the support carries pressure against the normal only.
-    normal : (3,) array
-        Outward normal.
+    normal : (s, 3) array
+        Outward normals.
     """
 
     node: Index
@@ -74,8 +80,31 @@ class Supports(NamedTuple):
 
 
 @inlined_kernel
-def apply_parts(nodes, start, ties, gaps, supports):
-    """Add the forces of ties, gaps and supports and return the energy (J) stored in them.
+def apply_ties(nodes, ties, begin, end):
+    """Add the forces of a range of ties and return the energy (J) stored in them.
+
+    Parameters
+    ----------
+    nodes : Nodes
+        ``force`` is increased in place.
+    ties : Ties
+    begin, end : int
+        Range.
+    """
+    x, force, stored = nodes.position, nodes.force, 0.0
+    for i in range(begin, end):
+        a, b, k = ties.first[i], ties.second[i], ties.stiffness[i]
+        for j in range(3):
+            pull = k * (x[b, j] - x[a, j])
+            force[a, j] += pull
+            force[b, j] -= pull
+            stored += 0.5 * pull * pull / k
+    return stored
+
+
+@inlined_kernel
+def apply_gaps(nodes, start, gaps, begin, end):
+    """Add the forces of a range of gaps and return the energy (J) that they took in.
 
     Parameters
     ----------
@@ -83,45 +112,58 @@ def apply_parts(nodes, start, ties, gaps, supports):
         ``force`` is increased in place.
     start : (n, 3) array
         Places of the nodes at rest, m.
-    ties : Ties
     gaps : Gaps
-    supports : Supports
+        ``deepest`` is updated.
+    begin, end : int
+        Range.
     """
-    x, force, stored = nodes.position, nodes.force, 0.0
-    for i in range(ties.first.shape[0]):
-        a, b, k = ties.first[i], ties.second[i], ties.stiffness[i]
-        for j in range(3):
-            pull = k * (x[b, j] - x[a, j])
-            force[a, j] += pull
-            force[b, j] -= pull
-            stored += 0.5 * pull * pull / k
-    for i in range(gaps.upper.shape[0]):
+    x, force, taken = nodes.position, nodes.force, 0.0
+    for i in range(begin, end):
         a, b = gaps.upper[i], gaps.lower[i]
         approach = 0.0
         for j in range(3):
             moved = x[a, j] - start[a, j]
             if b >= 0:
                 moved -= x[b, j] - start[b, j]
-            approach -= gaps.normal[j] * moved
+            approach -= gaps.normal[i, j] * moved
         closed = approach - gaps.clearance[i]
-        if closed <= 0.0:
+        k, ratio = gaps.stiffness[i], gaps.unloading[i]
+        deepest = max(gaps.deepest[i], closed)
+        if deepest <= 0.0:
             continue
-        push = gaps.stiffness[i] * closed
-        stored += 0.5 * push * closed
+        gaps.deepest[i] = deepest
+        push = max(k * deepest - ratio * k * (deepest - closed), 0.0)
+        taken += 0.5 * k * deepest * deepest * (1.0 - 1.0 / ratio) + 0.5 * push * push / (ratio * k)
         for j in range(3):
-            force[a, j] += push * gaps.normal[j]
+            force[a, j] += push * gaps.normal[i, j]
             if b >= 0:
-                force[b, j] -= push * gaps.normal[j]
-    for i in range(supports.node.shape[0]):
+                force[b, j] -= push * gaps.normal[i, j]
+    return taken
+
+
+@inlined_kernel
+def apply_supports(nodes, supports, begin, end):
+    """Add the forces of a range of supports and return the energy (J) stored in them.
+
+    Parameters
+    ----------
+    nodes : Nodes
+        ``force`` is increased in place.
+    supports : Supports
+    begin, end : int
+        Range.
+    """
+    x, force, stored = nodes.position, nodes.force, 0.0
+    for i in range(begin, end):
         n, k = supports.node[i], supports.stiffness[i]
         if supports.stop[i]:
             depth = 0.0
             for j in range(3):
-                depth -= supports.normal[j] * (x[n, j] - supports.rest[i, j])
+                depth -= supports.normal[i, j] * (x[n, j] - supports.rest[i, j])
             if depth > 0.0:
                 stored += 0.5 * k * depth * depth
                 for j in range(3):
-                    force[n, j] += k * depth * supports.normal[j]
+                    force[n, j] += k * depth * supports.normal[i, j]
         else:
             for j in range(3):
                 moved = x[n, j] - supports.rest[i, j]

@@ -12,7 +12,7 @@ import trimesh
 
 from models.protocol import Model
 from models.registry import load_model
-from models.vehicle.surface.car import load_car
+from models.vehicle.car import load_car
 from models.vehicle.surface.field import distances
 
 NAME = "family_car_1990s"

@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 from models.registry import load_model
+from models.vehicle.car import load_car
 from models.vehicle.profile import hood_edge_distance
-from models.vehicle.surface.car import load_car
 from models.vehicle.surface.field import distances
 from models.vehicle.surface.field_build import build_field
 from models.vehicle.surface.generator import generate_surface

@@ -6,13 +6,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from models.protocol import Model
 from models.registry import load_model
-from models.shells.explicit import build_shells, stable_step
-from models.shells.hood_mesh import INNER, OUTER, build_hood
+from models.shells.assembly import NODES
+from models.vehicle.car import load_car
 from models.vehicle.profile import load_vehicle
-from models.vehicle.surface.car import load_car
+from models.vehicle.structure.build import build_structure
+from models.vehicle.structure.panel import Panel
 from models.vehicle.surface.field import distances
 
 CAR = load_vehicle("family_car_1990s")
@@ -33,44 +35,58 @@ def outputs(**inputs: float) -> dict[str, float]:
     return dict(run.outputs)
 
 
+def hood_of(size: float) -> Panel:
+    return build_structure(CAR, size, only=("hood",)).panels[0]
+
+
 @pytest.mark.parametrize("size", [0.04, 0.025, 0.02, 0.0125])
 def test_edges_of_the_ribs_are_grid_lines_at_every_size(size: float) -> None:
-    hood = build_hood(CAR, size)
-    inner = hood.sheet == INNER
-    outer = hood.position[hood.sheet == OUTER]
-    # Depth below the outer sheet at the same place in plan.
-    place = {tuple(np.round(p, 6)): k for k, p in enumerate(hood.plan[hood.sheet == OUTER])}
-    rows = [place[tuple(np.round(p, 6))] for p in hood.plan[inner]]
-    depth = (outer[rows] - hood.position[inner]) @ hood.normal
+    hood = hood_of(size)
+    outer, inner = (np.unique(hood.elements[hood.outer == flag]) for flag in (True, False))
+    # Depth below the outer sheet: nodes of both sheets lie on one line along the hood's normal.
+    normal = hood.gaps.normal[0]
+    flat = np.eye(3) - np.outer(normal, normal)
+    away, nearest = cKDTree(hood.position[outer] @ flat).query(hood.position[inner] @ flat)
+    assert away.max() < 1e-9
+    depth = (hood.position[outer][nearest] - hood.position[inner]) @ normal
     assert depth.min() > -1e-12 and depth.max() == pytest.approx(0.025)
-    # The bottoms and flanges of the middle rib are flat, whatever the size.
-    middle = np.abs(hood.plan[inner][:, 1]) < 0.021
-    long = (hood.plan[inner][:, 0] > 0.2) & (hood.plan[inner][:, 0] < 0.4)
-    np.testing.assert_allclose(depth[middle & long], 0.025)
+    # The bottom of the middle rib is flat, whatever the size.
+    place = hood.position[inner]
+    middle = (np.abs(place[:, 1]) < 0.021) & (place[:, 0] < -0.4) & (place[:, 0] > -0.6)
+    np.testing.assert_allclose(depth[middle], 0.025)
     assert len(hood.ties.first) > 100
     np.testing.assert_allclose(
         hood.position[hood.ties.first], hood.position[hood.ties.second], atol=1e-12
     )
 
 
-def test_the_mesh_faces_up_lies_on_the_car_and_weighs_what_a_hood_does() -> None:
-    hood = build_hood(CAR, 0.02)
-    nodes, shells = build_shells(
-        hood.position, hood.elements, hood.thickness, hood.material, hood.materials
-    )
-    assert 4500 < len(hood.elements) < 6500
-    assert 12.0 < nodes.mass.sum() < 17.0
-    assert (shells.frame[:, 2] @ hood.normal > 0.4).all()
-    assert 1e-6 < stable_step(shells, hood.materials) < 4e-6
-    near = (np.abs(hood.plan[:, 1]) < 0.6) & (hood.plan[:, 0] > 0.02) & (hood.sheet == OUTER)
-    away, _ = distances(load_car(CAR.name).field(), hood.position[near])
-    assert np.abs(away).max() < 0.008
-    mirrored = hood.plan * np.array([1.0, -1.0])
-    known = {tuple(row) for row in np.round(np.column_stack([hood.plan, hood.sheet]), 6).tolist()}
-    other = {tuple(row) for row in np.round(np.column_stack([mirrored, hood.sheet]), 6).tolist()}
-    assert {tuple(abs(v) for v in row) for row in known} == {
-        tuple(abs(v) for v in row) for row in other
+def test_the_panels_face_out_lie_on_the_car_and_weigh_what_they_do() -> None:
+    structure = build_structure(CAR, 0.02)
+    body = structure.assemble()
+    first = body.first[NODES]
+    mass = {
+        panel.name: body.nodes.mass[first[k] : first[k + 1]].sum()
+        for k, panel in enumerate(structure.panels)
     }
+    assert 12.0 < mass["hood"] < 17.0
+    assert 1.0 < mass["bumper"] + mass["lower bumper"] < 4.0
+    assert 6500 < structure.element_count < 8500
+    assert 1e-6 < body.step < 4e-6
+    away, gradient = distances(load_car(CAR.name).field(), body.start[body.touched])
+    assert np.quantile(np.abs(away), 0.99) < 0.006 and np.abs(away).max() < 0.025
+    facing = np.einsum("tk,tk->t", body.normal, gradient) / np.linalg.norm(gradient, axis=1)
+    assert np.quantile(facing, 0.01) > 0.8
+    # The area that bodies can touch is that of the outer elements, and both sides are alike.
+    corners = [p.position[p.elements[p.outer]] for p in structure.panels]
+    sides = np.concatenate(corners)
+    across = np.cross(sides[:, 2] - sides[:, 0], sides[:, 3] - sides[:, 1])
+    assert body.area.sum() == pytest.approx(0.5 * np.linalg.norm(across, axis=1).sum(), rel=1e-3)
+    left = body.start[:, 1] > 1e-9
+    assert np.count_nonzero(left) == np.count_nonzero(body.start[:, 1] < -1e-9)
+
+
+def test_finer_elements_are_the_number_of_the_papers_car() -> None:
+    assert 27_000 < build_structure(CAR, 0.01).element_count < 37_000
 
 
 def test_the_energy_of_a_hit_is_all_booked_and_the_hood_keeps_a_dent() -> None:

@@ -37,7 +37,8 @@ def run_free(nodes, shells, materials, step, count, loaded, load, history, frame
                 work += 0.5 * step * load[k, i, j] * nodes.velocity[loaded[i], j]
         history[k, 1] = work
         # Velocities lie half a step before the first forces.
-        history[k, 0] = advance(nodes, step, step if k > 0 else 0.5 * step)
+        count_of = nodes.mass.shape[0]
+        history[k, 0] = advance(nodes, 0, count_of, step, step if k > 0 else 0.5 * step)
         for i in range(loaded.shape[0]):
             for j in range(3):
                 work += 0.5 * step * load[k, i, j] * nodes.velocity[loaded[i], j]

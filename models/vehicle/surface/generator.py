@@ -7,9 +7,11 @@ table ``surface``.
 
 import functools
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
 
 from models import data
 from models.vehicle.profile import Vehicle, load_vehicle
@@ -34,14 +36,45 @@ LAMP = "lamp"
 """Region of the headlamps; their law is that of the zone in which they lie."""
 
 
-@functools.cache
-def generate_surface(name: str) -> SurfaceMesh:
-    """Return the mesh of a vehicle of the data folder.
+@dataclass(frozen=True)
+class Loft:
+    """The profile line of a car drawn across its width.
 
-    Parameters
+    Attributes
     ----------
-    name : str
-        Name of the vehicle.
+    line : ProfileLine
+    along : (k,) array
+        Length along the profile up to each of its points, m.
+    width : (k,) array
+        Half width there, m.
+    stations : (n,) array
+        Shares of the half width, from -1 (right) to 1 (left).
+    nodes : (n, k, 3) array
+        m.
+    """
+
+    line: ProfileLine
+    along: Array
+    width: Array
+    stations: Array
+    nodes: Array
+
+    def points(self, along: Array, y: Array) -> Array:
+        """Return the points (m, 3) of the surface at lengths along the profile and stations y, m.
+
+        Beyond the car's half width they lie as far below its edge, on the flat side.
+        """
+        edge = np.interp(along, self.along, self.width)
+        share = np.clip(y / edge, -1.0, 1.0)
+        at = RegularGridInterpolator((self.stations, self.along), self.nodes)
+        found = np.asarray(at(np.stack([share, along], axis=1)))
+        found[:, 2] -= np.maximum(np.abs(y) - edge, 0.0)
+        return found
+
+
+@functools.cache
+def loft_of(name: str) -> Loft:
+    """Return the loft of a vehicle of the data folder.
 
     Raises
     ------
@@ -64,6 +97,29 @@ def generate_surface(name: str) -> SurfaceMesh:
         nodes[k, :, 0] = line.points[:, 0] - 0.5 * curvature * y**2 - inwards * normal[:, 0]
         nodes[k, :, 1] = y
         nodes[k, :, 2] = line.points[:, 1] - crown * s**2 - inwards * normal[:, 1]
+    step = np.linalg.norm(np.diff(line.points, axis=0), axis=1)
+    return Loft(line, np.concatenate([[0.0], np.cumsum(step)]), width, stations, nodes)
+
+
+@functools.cache
+def generate_surface(name: str) -> SurfaceMesh:
+    """Return the mesh of a vehicle of the data folder.
+
+    Parameters
+    ----------
+    name : str
+        Name of the vehicle.
+
+    Raises
+    ------
+    ValueError
+        If there is no vehicle of that name.
+    """
+    vehicle = load_vehicle(name)
+    shape = data.load(f"vehicles/{name}.toml")["surface"]
+    loft = loft_of(name)
+    nodes, line = loft.nodes, loft.line
+    stations = loft.stations
     facets, place = _loft(len(stations), len(line.points))
     zone = line.zone[place]
     # Both sides are alike; the right one, first, is seen counterclockwise.

@@ -43,10 +43,13 @@ class ReadSurface:
         In the frame of the static car, m.
     notes : list of str
         What was changed, and what is left open.
+    shift : (3,) array
+        What was added to the coordinates of the file, once in m, m.
     """
 
     mesh: SurfaceMesh
     notes: list[str]
+    shift: Array
 
 
 def read_surface(
@@ -102,7 +105,7 @@ def read_surface(
     mesh = replace(compact, nodes=compact.nodes + shift)
     mesh = _face_outwards(path, mesh, notes)
     _check_placing(path, mesh)
-    return ReadSurface(mesh, notes)
+    return ReadSurface(mesh, notes, shift)
 
 
 def read_mesh(path: Path) -> SurfaceMesh:

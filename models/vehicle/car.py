@@ -1,7 +1,7 @@
-"""The surface of a car as the facet model uses it: mesh, laws of its regions, distance field.
+"""A car as the models with surfaces use it: mesh, laws of its regions, distance field, shells.
 
-A car is a vehicle of the data folder, whose mesh is generated, or a car file: a user's mesh and the
-zones of a vehicle whose laws its facets have.
+A car is a vehicle of the data folder, whose mesh is generated, or a car file: a user's mesh, the
+zones of a vehicle whose laws its facets have, and perhaps a user's deck of shells.
 """
 
 import hashlib
@@ -15,6 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.vehicle.profile import Vehicle, load_vehicle
+from models.vehicle.structure.build import build_structure, check_size
+from models.vehicle.structure.change import Change
+from models.vehicle.structure.own_front import changed, read_own_front
+from models.vehicle.structure.panel import Structure
 from models.vehicle.surface.field import DistanceField
 from models.vehicle.surface.generator import generate_surface, laws_of_regions
 from models.vehicle.surface.mesh import SurfaceMesh
@@ -24,7 +28,8 @@ from models.vehicle.surface.store import load_field
 Array = NDArray[np.float64]
 
 FORMAT = "mcstudy-car/1"
-_KEYS = {"format", "mesh", "unit", "lift", "vehicle", "zone", "regions"}
+_KEYS = {"format", "mesh", "unit", "lift", "vehicle", "zone", "regions", "shells"}
+_SHELLS = {"deck", "units", "ignore"}
 _RULES = {"part", "file", "box"}
 
 
@@ -42,12 +47,40 @@ class Car:
         Of a user's mesh and rules; empty for a vehicle of the data folder.
     notes : list of str
         What was changed in a user's mesh, and what is left open.
+    own_shells : Structure or None
+        A user's deck of shells.
     """
 
     vehicle: Vehicle
     mesh: SurfaceMesh
     digest: str
     notes: list[str]
+    own_shells: Structure | None = None
+
+    def structure(self, size: float, change: Change) -> Structure:
+        """Return the shells of the car's front.
+
+        Parameters
+        ----------
+        size : float
+            Size of the elements of generated shells, m.
+        change : Change
+            Factors.
+
+        Raises
+        ------
+        ValueError
+            If the car has no shells, the size is not within 8 to 60 mm, or what is asked for does
+            not apply to a user's deck.
+        """
+        if self.own_shells is not None:
+            if change.rib != 1.0:
+                raise ValueError("rib_depth: a user's deck has no ribs that could be changed")
+            return changed(self.own_shells, change, [zone.name for zone in self.vehicle.zones])
+        if self.digest:
+            raise ValueError("the car file has no table 'shells': it has no finite elements")
+        check_size(size)
+        return build_structure(self.vehicle, size, change)
 
     def field(self) -> DistanceField:
         """Return the distance field, whose regions are the rows of the vehicle's zones."""
@@ -100,7 +133,16 @@ def _read_car(table: Mapping[str, Any], folder: Path) -> Car:
     digest = hashlib.sha256()
     for array in (mesh.nodes, mesh.facets, row):
         digest.update(np.ascontiguousarray(array).tobytes())
-    return Car(vehicle, mesh, digest.hexdigest()[:12], read.notes)
+    shells, notes = None, read.notes
+    if "shells" in table:
+        entry = table["shells"]
+        shells, more = read_own_front(
+            folder / entry["deck"], entry["units"], entry.get("ignore", []), read.shift, mesh,
+            laws_of_regions(vehicle, mesh),
+        )  # fmt: skip
+        notes = [*notes, *more]
+        digest.update(shells.digest.encode())
+    return Car(vehicle, mesh, digest.hexdigest()[:12], notes, shells)
 
 
 def _check_table(table: Mapping[str, Any]) -> None:
@@ -116,6 +158,7 @@ def _check_table(table: Mapping[str, Any]) -> None:
     lift = table.get("lift", 0.0)
     if isinstance(lift, bool) or not isinstance(lift, int | float):
         raise ValueError("lift: must be a height in m")
+    _check_shells(table.get("shells"))
     rules = table.get("regions", [])
     if not isinstance(rules, list) or not all(isinstance(rule, dict) for rule in rules):
         raise ValueError("regions: must be tables [[regions]]")
@@ -128,6 +171,20 @@ def _check_table(table: Mapping[str, Any]) -> None:
         for key in ("part", "file"):
             if not isinstance(rule.get(key, ""), str):
                 raise ValueError(f"{place}.{key}: must be a text")
+
+
+def _check_shells(entry: Any) -> None:
+    """Raise ``ValueError`` if a car file's table of shells is not valid."""
+    if entry is None:
+        return
+    if not isinstance(entry, dict) or set(entry) - _SHELLS:
+        raise ValueError(f"shells: is a table with {', '.join(sorted(_SHELLS))}")
+    for key in ("deck", "units"):
+        if not isinstance(entry.get(key), str):
+            raise ValueError(f"shells.{key}: must be a text")
+    ignore = entry.get("ignore", [])
+    if not isinstance(ignore, list) or not all(isinstance(name, str) for name in ignore):
+        raise ValueError("shells.ignore: must be a list of keywords")
 
 
 def _zone(vehicle: Vehicle, name: str, place: str) -> int:

@@ -135,6 +135,8 @@ def _compile(
         "forceinline": inline,
         "_nrt": False,
         "no_cfunc_wrapper": True,
+        # A run of a minute can be watched from another thread.
+        "nogil": True,
     }
     compiled: Any = numba.njit(**flags)(function)
     if _CACHED:

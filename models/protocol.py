@@ -156,18 +156,22 @@ class Mesh:
     ----------
     name : str
     nodes : (f, k, 3) or (k, 3) array
-        Positions in world axes at each frame, m; of a rigid body in its own frame.
+        Positions, m: at each time if the surface deforms, else always the same.
     faces : (t, 3) or (t, 4) array
         Nodes of each facet, counterclockwise seen from outside.
     body : str
-        Rigid body whose frame it is: ``car``, or an ellipsoid, in whose place it is drawn; empty
-        for positions at each frame.
+        Rigid body in whose frame they are: ``car``, or an ellipsoid, in whose place it is drawn;
+        empty for world axes.
+    time : (f,) array or None
+        Times of the shapes of a surface that deforms, each lasting to the next, s; by default the
+        frames of the scene.
     """
 
     name: str
     nodes: Array
     faces: NDArray[np.int64]
     body: str = ""
+    time: Array | None = None
 
 
 @dataclass(frozen=True)

@@ -96,7 +96,7 @@ def summarise(folder: ResultsFolder) -> list[str | Table]:
 
 
 def run_case(
-    path: Path | str, *, out: Path | str | None = None
+    path: Path | str, *, out: Path | str | None = None, quiet: bool = True
 ) -> tuple[Run, list[PublishedTable], ResultsFolder]:
     """Run a reconstruction file and write its folder.
 
@@ -106,6 +106,8 @@ def run_case(
         Study file of a reconstruction (TOML).
     out : path or str, optional
         Results folder, by default ``results/<name>``.
+    quiet : bool
+        Show no progress of a long run.
 
     Returns
     -------
@@ -124,7 +126,7 @@ def run_case(
     if not isinstance(study, Reconstruction):
         raise UserError(f"{path}: kind {study.kind!r} is run by 'mcstudy run'")
     folder = results_folder(study, out)
-    run, tables = reconstruct(study)
+    run, tables = reconstruct(study, quiet=quiet)
     variants = run_variants(study)
     write_reconstruction(study, text, run, tables, folder, variants)
     return run, tables, folder

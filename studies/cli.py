@@ -82,7 +82,7 @@ def reconstruct(study: Study, out: Out = None, quiet: Quiet = False, as_json: Js
     from studies import api
     from studies.published_tables import as_table
 
-    case, tables, folder = api.run_case(study, out=out)
+    case, tables, folder = api.run_case(study, out=out, quiet=quiet or as_json)
     if as_json:
         _print_json(dict(case.outputs) | {"status": case.status})
     elif not quiet:

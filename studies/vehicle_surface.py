@@ -11,8 +11,8 @@ from mcstudy.figures import style
 from mcstudy.figures.surface import Facets, draw_surface
 from mcstudy.report import Table
 from mcstudy.text import number
-from models.vehicle.profile import vehicle_names
 from models.vehicle.car import load_car
+from models.vehicle.profile import vehicle_names
 from models.vehicle.surface.mesh import SurfaceMesh
 from models.vehicle.surface.reader import read_surface
 from models.vehicle.surface.wrap import wrap_line

@@ -4,7 +4,8 @@ import math
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from typing import TextIO, TypeVar
 
 import numpy as np
@@ -15,6 +16,8 @@ Item = TypeVar("Item")
 
 REACH = 1.96
 """Standard errors of a 95 % interval."""
+PACE = 0.5
+"""Time (s) between two looks at a run under way."""
 MIN_COUNT = 10
 """Smallest number of values for an interval of the mean."""
 
@@ -61,6 +64,41 @@ def follow(
     if live:
         stream.write(f"\r\x1b[K{len(items)}/{len(items)} {what}\n")
         stream.flush()
+
+
+def watch(
+    work: Callable[[], Item],
+    reached: Callable[[], float] | None,
+    *,
+    quiet: bool = False,
+    stream: TextIO | None = None,
+) -> Item:
+    """Return what one long run gives, and show on a terminal how far it is.
+
+    Parameters
+    ----------
+    work : callable
+        The run; it lets other threads go on.
+    reached : callable or None
+        Returns the time that the run under way has reached, s; None to show nothing.
+    quiet : bool
+        Print nothing at all.
+    stream : TextIO, optional
+        By default standard error.
+    """
+    stream = stream or sys.stderr
+    if quiet or reached is None or not stream.isatty():
+        return work()
+    with ThreadPoolExecutor(max_workers=1) as pool:
+        task = pool.submit(work)
+        begun = time.monotonic()
+        while wait([task], timeout=PACE).not_done:
+            passed = time.monotonic() - begun
+            stream.write(f"\r\x1b[K{1000.0 * reached():.0f} ms of the crash, {passed:.0f} s")
+            stream.flush()
+        stream.write("\r\x1b[K")
+        stream.flush()
+        return task.result()
 
 
 class _RunningMean:

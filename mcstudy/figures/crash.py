@@ -30,6 +30,8 @@ class MeshLike(Protocol):
     def faces(self) -> NDArray[np.int64]: ...
     @property
     def body(self) -> str: ...
+    @property
+    def time(self) -> Array | None: ...
 
 
 class SceneLike(Protocol):
@@ -113,17 +115,21 @@ def _draw_body(
 
 def _positions(scene: SceneLike, mesh: MeshLike, frame: int) -> Array:
     """Return the nodes (k, 3) of a mesh in world axes."""
+    nodes = mesh.nodes
+    if nodes.ndim == 3:
+        row = frame
+        if mesh.time is not None:
+            row = int(np.searchsorted(mesh.time, scene.time[frame], side="right")) - 1
+        nodes = nodes[max(row, 0)]
     if not mesh.body:
-        return np.asarray(mesh.nodes[frame])
+        return np.asarray(nodes)
     if mesh.body == CAR:
         x, y, yaw = scene.car[frame]
         c, s = math.cos(yaw), math.sin(yaw)
-        turned = mesh.nodes @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        turned = nodes @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         return np.asarray(turned + np.array([x, y, 0.0]))
     k = list(scene.names).index(mesh.body)
-    return np.asarray(
-        mesh.nodes @ _rotation(scene.orientation[frame, k]).T + scene.centre[frame, k]
-    )
+    return np.asarray(nodes @ _rotation(scene.orientation[frame, k]).T + scene.centre[frame, k])
 
 
 def _draw_meshes(

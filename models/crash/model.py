@@ -136,6 +136,10 @@ class CrashModel(ABC):
         """
         return self._run(complete_inputs(self, inputs), outputs, channels, scene=False)
 
+    def reached(self) -> float:
+        """Return the time (s) that the run under way has reached; 0 for a model of quick runs."""
+        return 0.0
+
     def run_batch(self, rows: Array, started: Callable[[int], None] | None = None) -> Batch:
         """Run rows of inputs.
 

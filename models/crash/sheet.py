@@ -137,17 +137,23 @@ def booked_energy(sheet: Sheet) -> float:
     )
 
 
-def shapes_at(sheet: Sheet, time: Array) -> Array:
-    """Return the places (f, t, 3) of the touched nodes at times, in m.
+def keep_shape(sheet: Sheet, time: float) -> None:
+    """Make the present shape the last picture of the film, from a time (s) on."""
+    row = min(int(sheet.clock[TAKEN]), SHOTS - 1)
+    moved = sheet.body.nodes.position - sheet.body.start
+    sheet.film[row] = moved[sheet.body.touched]
+    sheet.film_time[row] = time
+    sheet.clock[TAKEN] = row + 1
+
+
+def shapes_of(sheet: Sheet) -> tuple[Array, Array]:
+    """Return times (f,) in s and places (f, t, 3) in m of the touched nodes, from rest on.
 
     Parameters
     ----------
     sheet : Sheet
-    time : (f,) array
-        s.
     """
     taken = int(sheet.clock[TAKEN])
-    row = np.searchsorted(sheet.film_time[:taken], time, side="right") - 1
     start = sheet.body.start[sheet.body.touched]
-    moved = np.where((row < 0)[:, None, None], 0.0, sheet.film[np.maximum(row, 0)])
-    return np.asarray(start + moved)
+    shapes = np.concatenate([start[None], start + sheet.film[:taken]])
+    return np.concatenate([[0.0], sheet.film_time[:taken]]), shapes

@@ -13,9 +13,19 @@ from models import data
 from models.crash.facet_survey import empty_findings
 from models.crash.model import TICK
 from models.crash.outcome import ANGULAR_CLASS, LINEAR_CLASS, Raw
-from models.crash.record import Column, Frame, HeadContact
+from models.crash.record import Column, HeadContact
 from models.crash.scenario import HOOD, Scenario
-from models.crash.sheet import FRESH, WORK, Sheet, booked_energy, build_sheet, shapes_at
+from models.crash.sheet import (
+    FRESH,
+    NOW,
+    TAKEN,
+    WORK,
+    Sheet,
+    booked_energy,
+    build_sheet,
+    keep_shape,
+    shapes_of,
+)
 from models.crash.sheet_front import SheetFront
 from models.declaration import read_inputs, read_outputs
 from models.effects.registry import effects_of
@@ -25,7 +35,7 @@ from models.pedestrian.anthropometry import HEAD, SEGMENTS, Body
 from models.pedestrian.tissue import build_tissue
 from models.protocol import Input, Mesh
 from models.shells.assembly import NODES
-from models.shells.settling import AROUND, dent_near, settle, settling_steps
+from models.shells.settling import AROUND, SETTLING, dent_near, settle, settling_steps
 from models.shells.state import WORK_BOW
 from models.vehicle.profile import Vehicle, diving_points, static_point
 from models.vehicle.structure.build import structure_table
@@ -112,6 +122,10 @@ class FemModel(FacetModel):
         self._sheet: Sheet | None = None
         self._structure: Structure | None = None
 
+    def reached(self) -> float:
+        """Return the time (s) that the run under way has reached."""
+        return float(self._sheet.clock[NOW]) if self._sheet is not None else 0.0
+
     def _step(self, values: dict[str, float]) -> Raw | None:
         self._values = values
         return super()._step(values)
@@ -161,7 +175,10 @@ class FemModel(FacetModel):
         """Return the outputs of the dents of head and pelvis, once the shells are at rest."""
         body = sheet.body
         body.awake[:] = sheet.state != FRESH
-        settle(body, body.step, settling_steps(body.step) if body.awake.any() else 0)
+        if body.awake.any():
+            settle(body, body.step, settling_steps(body.step))
+            last = sheet.film_time[max(int(sheet.clock[TAKEN]) - 1, 0)]
+            keep_shape(sheet, last + SETTLING)
         found = dict.fromkeys(DENT, math.nan)
         if math.isfinite(raw.head_contact[HeadContact.TIME]):
             contact = raw.head_contact[HeadContact.POINT : HeadContact.POINT + 3]
@@ -194,7 +211,7 @@ class FemModel(FacetModel):
         car = found[0]
         kept = self.mesh.region != self.mesh.names.index(REPLACED)
         found[0] = Mesh("car", car.nodes, car.faces[kept], "car")
-        shapes = shapes_at(sheet, raw.frames[:, Frame.TIME])
+        time, shapes = shapes_of(sheet)
         shapes[..., [0, 2]] = diving_points(
             self.vehicle, raw.scenario.dive_angle, shapes[..., [0, 2]]
         )
@@ -204,7 +221,7 @@ class FemModel(FacetModel):
         for k, panel in enumerate(structure.panels):
             faces = number[panel.elements[panel.outer] + base[k]]
             rows, faces = np.unique(faces, return_inverse=True)
-            found.append(Mesh(panel.name, shapes[:, rows], faces.reshape(-1, 4), "car"))
+            found.append(Mesh(panel.name, shapes[:, rows], faces.reshape(-1, 4), "car", time))
         return found
 
 

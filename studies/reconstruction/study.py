@@ -7,13 +7,16 @@ from typing import Any
 import numpy as np
 
 from mcstudy.errors import StudyError, UserError
+from mcstudy.execution.progress import watch
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.figures import crash, stiffness, style
+from mcstudy.figures.dents import draw_dents
 from mcstudy.figures.ranges import draw_ranges
 from mcstudy.report import Section, Table, render
 from mcstudy.studyfile.study_inputs import fixed_values
 from mcstudy.studyfile.study_outputs import check_outputs
 from mcstudy.text import quantity
+from models.crash.model import CrashModel
 from models.protocol import Model, Run, complete_status
 from studies.isomme_export import write_isomme
 from studies.published_tables import PublishedTable, as_table, compare_with_table
@@ -21,6 +24,8 @@ from studies.reconstruction.schema import Reconstruction
 from studies.reconstruction.variants import VariantOutcome, variant_ranges, variant_table
 from studies.runs import load_study_model
 
+LONG = 5.0
+"""CPU time (s) of a run from which on its progress is shown."""
 PRIMARY = 0.12
 """s after first contact that the histories show: the impact on the car."""
 
@@ -57,8 +62,14 @@ _VIEWS = {
 }
 
 
-def reconstruct(study: Reconstruction) -> tuple[Run, list[PublishedTable]]:
+def reconstruct(study: Reconstruction, *, quiet: bool = True) -> tuple[Run, list[PublishedTable]]:
     """Run the study's case once.
+
+    Parameters
+    ----------
+    study : Reconstruction
+    quiet : bool
+        Show no progress of a long run.
 
     Returns
     -------
@@ -81,7 +92,10 @@ def reconstruct(study: Reconstruction) -> tuple[Run, list[PublishedTable]]:
             unknown = sorted(set(row.values) - set(table.units))
             if unknown:
                 raise UserError(f"tables[{k}].rows[{j}].values.{unknown[0]}: has no unit in units")
-    run = model.run(values)
+    reached = None
+    if isinstance(model, CrashModel) and model.cost > LONG:
+        reached = model.reached
+    run = watch(lambda: model.run(values), reached, quiet=quiet)
     if run.status not in complete_status(model):
         raise StudyError(f"the run ended with status {run.status!r}")
     si = {item.name: item.unit for item in model.outputs}
@@ -96,6 +110,9 @@ def draw(study: Reconstruction, run: Run) -> dict[str, Any]:
     figures: dict[str, Any] = {}
     if run.scene is not None:
         figures["kinematics"] = crash.draw_strip(run.scene, study.strip_times)
+        dents = draw_dents(run.scene)
+        if dents is not None:
+            figures["dents"] = dents
     for name, view in _VIEWS.items():
         history = run.histories.get(view.group)
         if history is None or not set(view.channels.values()) <= set(history.channels):

@@ -296,6 +296,7 @@ class Mesh:
     nodes: Array
     faces: NDArray[np.int64]
     body: str = ""
+    time: Array | None = None
 
 
 @dataclass(frozen=True)

@@ -94,7 +94,9 @@ def watch(
         begun = time.monotonic()
         while wait([task], timeout=PACE).not_done:
             passed = time.monotonic() - begun
-            stream.write(f"\r\x1b[K{1000.0 * reached():.0f} ms of the crash, {passed:.0f} s")
+            now = reached()
+            where = f"{1000.0 * now:.0f} ms of the crash" if now > 0.0 else "getting ready"
+            stream.write(f"\r\x1b[K{where}, {passed:.0f} s")
             stream.flush()
         stream.write("\r\x1b[K")
         stream.flush()

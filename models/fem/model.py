@@ -46,6 +46,7 @@ from models.vehicle.surface.field import DistanceField
 from models.vehicle.surface.generator import laws_of_regions
 from models.vehicle.surface.mesh import SurfaceMesh
 from models.vehicle.surface.store import load_field
+from models.vehicle.surface.wrap import leading_edge_distance, section, wrap_distance
 
 Array = NDArray[np.float64]
 
@@ -198,9 +199,9 @@ class FemModel(FacetModel):
         return found
 
     def _behind_edge(self, point: Array) -> float:
-        """Return how far (m) a point lies behind the hood's leading edge, along the hood."""
-        hood = self.vehicle.zones[self.vehicle.zone_index(HOOD)]
-        return float((point[[0, 2]] - hood.origin) @ hood.direction)
+        """Return how far (m) a point lies behind the hood's leading edge line, by tape."""
+        lines = section(self.mesh, float(point[1]))
+        return wrap_distance(lines, point[[0, 2]]) - leading_edge_distance(lines)
 
     def _meshes(self, raw: Raw) -> list[Mesh]:
         """Return the car without what the shells replace, the shells over time, and the child."""

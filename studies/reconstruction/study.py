@@ -212,6 +212,7 @@ def _report(
 ) -> str:
     captions = {name: view.caption for name, view in _VIEWS.items()} | {
         "kinematics": "The body from the side, in the car's frame.",
+        "dents": "Displacement of the car's shells from above: the largest, and what is left.",
         "contact_force": "Contact force of each zone of the car.",
         "force_penetration": "Force of the hood on the headform against penetration.",
         "variants": "The same inputs through models that differ in one thing.",
@@ -239,13 +240,14 @@ def _report(
         )
     apart = {
         name: {captions[name]: figures[name]} if name in figures else {}
-        for name in ("kinematics", "variants")
+        for name in ("kinematics", "dents", "variants")
     }
     rest = {captions[name]: figure for name, figure in figures.items() if name not in apart}
     sections = [
         Section("Comparison with the published tables", (), [as_table(table) for table in tables]),
         Section("One change at a time", *_variants_said(study, model, variants), apart["variants"]),
         Section("Kinematics", (), (), apart["kinematics"], animations),
+        Section("Dents", (), (), apart["dents"]),
         Section("Histories", (), (), rest),
         Section("Numbers", (), numbers),
     ]

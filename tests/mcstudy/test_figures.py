@@ -19,7 +19,7 @@ from test_risk_curve import analysis, cases
 
 from mcstudy import statistics
 from mcstudy.execution.results import to_json
-from mcstudy.figures import crash, distributions, panels, relations, risk, stiffness, style
+from mcstudy.figures import crash, dents, distributions, panels, relations, risk, stiffness, style
 from mcstudy.figures.distributions import Mark
 from mcstudy.figures.panels import Band, Curve, Panel, draw_panels, use_log_scale
 from mcstudy.injury.risk_curve import RiskDescription
@@ -554,3 +554,38 @@ def test_the_users_settings_are_left_alone() -> None:
     assert title.get_fontsize() == 11.0
     assert not title.axes.spines["top"].get_visible()
     assert len(set(style.PALETTE)) == len(style.PALETTE)
+
+
+def test_dents_are_drawn_with_their_depths(scene: Scene) -> None:
+    # A panel of 2 x 2 squares that is pressed 40 mm at one corner and keeps 25 mm.
+    x, y = (g.ravel() for g in np.meshgrid([-0.4, 0.0, 0.4], [-0.4, 0.0, 0.4], indexing="ij"))
+    rest = np.stack([x, y, 0.8 + 0.0 * x], axis=1)
+    pressed, kept = rest.copy(), rest.copy()
+    pressed[8, 2], kept[8, 2] = 0.76, 0.775
+    faces = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]])
+    panel = Mesh(np.stack([rest, pressed, kept]), faces, "car", np.array([0.0, 0.02, 0.04]))
+    assert dents.draw_dents(scene) is None
+    figure = dents.draw_dents(replace(scene, meshes=(panel,)))
+    assert figure is not None
+    written = [[text.get_text() for text in axes.texts] for axes in figure.axes[:2]]
+    # Mean of a square's corners.
+    assert written == [["10 mm"], ["6 mm"]]
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert any("[mm]" in label for label in labels) and any("[m]" in label for label in labels)
+
+
+def test_a_surface_that_deforms_is_drawn_as_it_is_at_each_time(scene: Scene) -> None:
+    square = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.0, 0.1], [0.0, 0.0, 0.1]])
+    faces = np.array([[0, 1, 2, 3]])
+    shapes = np.stack([square, 2.0 * square])
+    moving = Mesh(shapes, faces, "car", np.array([0.0, float(scene.time[-1])]))
+    at_rest = Mesh(square, faces, "car")
+
+    def drawn(mesh: Mesh, time: float) -> Array:
+        figure = crash.draw_strip(replace(scene, meshes=(mesh,)), [time])
+        paths = figure.axes[0].collections[0].get_paths()
+        return np.concatenate([path.vertices for path in paths])
+
+    first, last = float(scene.time[0]), float(scene.time[-1])
+    np.testing.assert_allclose(drawn(moving, first), drawn(at_rest, first))
+    assert np.ptp(drawn(moving, last), axis=0).max() == pytest.approx(0.2)

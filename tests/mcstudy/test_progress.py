@@ -2,13 +2,14 @@
 
 import io
 import re
+import time
 
 import numpy as np
 import pandas as pd
 import pytest
 from mcstudy_tools import Terminal
 
-from mcstudy.execution.progress import Progress, follow
+from mcstudy.execution.progress import Progress, follow, watch
 
 nobody_looks = pytest.mark.parametrize(
     ("stream", "quiet"), [(io.StringIO(), False), (Terminal(), True)]
@@ -100,3 +101,34 @@ def test_a_list_is_followed_by_counts_and_names() -> None:
     next(work)
     with pytest.raises(KeyError):
         work.throw(KeyError("broken"))
+
+
+def test_a_long_run_says_how_far_it_is_and_what_it_gives(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mcstudy.execution.progress.PACE", 0.02)
+    reached = [0.0]
+
+    def work() -> str:
+        reached[0] = 0.035
+        time.sleep(0.1)
+        return "done"
+
+    stream = Terminal()
+    assert watch(work, lambda: reached[0], stream=stream) == "done"
+    assert "35 ms of the crash" in stream.getvalue()
+    # The line is gone afterwards.
+    assert stream.getvalue().endswith("\r\x1b[K")
+
+
+@nobody_looks
+def test_a_long_run_nobody_looks_at_says_nothing(stream: io.StringIO, quiet: bool) -> None:
+    assert watch(lambda: 7, lambda: 0.0, quiet=quiet, stream=stream) == 7
+    assert watch(lambda: 8, None, stream=Terminal()) == 8
+    assert stream.getvalue() == ""
+
+
+def test_the_error_of_a_long_run_is_its_own() -> None:
+    def work() -> None:
+        raise ValueError("age must lie within 4 and 90")
+
+    with pytest.raises(ValueError, match="age must lie"):
+        watch(work, lambda: 0.0, stream=Terminal())

@@ -103,17 +103,23 @@ def test_left_and_right_are_alike() -> None:
         assert outputs(lateral_position=0.6)[name] == pytest.approx(right[name], rel=0.01), name
 
 
-def test_thinner_sheets_and_flatter_ribs_are_softer() -> None:
-    base = outputs(lateral_position=0.6)
-    for change in ({"sheet_thickness": 0.8}, {"rib_depth": 0.5}, {"yield_stress": 0.6}):
-        found = outputs(lateral_position=0.6, **change)
-        assert found["hic15"] < 0.97 * base["hic15"], change
-        assert found["hood_intrusion"] > base["hood_intrusion"], change
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param({"sheet_thickness": 0.8}, marks=pytest.mark.slow),
+        pytest.param({"yield_stress": 0.6}, marks=pytest.mark.slow),
+        {"rib_depth": 0.5},
+    ],
+)
+def test_thinner_sheets_and_flatter_ribs_are_softer(change: dict[str, float]) -> None:
+    base, found = outputs(lateral_position=0.6), outputs(lateral_position=0.6, **change)
+    assert found["hic15"] < 0.97 * base["hic15"]
+    assert found["hood_intrusion"] > base["hood_intrusion"]
 
 
 def test_a_faster_headform_is_hurt_more() -> None:
-    slow, fast = (outputs(lateral_position=0.6, impact_speed=v) for v in (6.0, 8.333333333333334))
-    exponent = math.log(fast["hic15"] / slow["hic15"]) / math.log(8.333333333333334 / 6.0)
+    slow, fast = outputs(lateral_position=0.6, impact_speed=6.0), outputs(lateral_position=0.6)
+    exponent = math.log(fast["hic15"] / slow["hic15"]) / math.log(30.0 / 3.6 / 6.0)
     # A prototype of other hands: 1.9 to 2.5 between 20 and 45 km/h.
     assert 1.2 < exponent < 3.2
 

@@ -8,7 +8,7 @@ import pytest
 from builders import Array
 
 from models.crash.facet_survey import empty_findings
-from models.crash.sheet import SLID, STEPS, WORK, booked_energy, build_sheet
+from models.crash.sheet import FRESH, SLID, STEPS, WORK, booked_energy, build_sheet
 from models.crash.sheet_front import SheetFront
 from models.crash.surfaces import CHANNELS, empty_contacts
 from models.criteria import head_injury_criterion
@@ -21,6 +21,7 @@ from models.headform.model import HeadformModel
 from models.headform.target import impact_axes
 from models.multibody.tree import empty_loads
 from models.registry import load_model
+from models.shells.assembly import NODES
 from models.vehicle.car import load_car
 from models.vehicle.structure.cover import with_replaced
 from models.vehicle.surface.generator import laws_of_regions
@@ -30,6 +31,7 @@ from models.vehicle.surface.wrap import wrap_point
 DRAFT, SPEED, MASS, RADIUS, INERTIA = 0.04, 30.0 / 3.6, 2.5, 0.065, 0.0036
 WAD, SIDE, ELEVATION = 1.35, 0.6, math.radians(79.0)
 FRICTION = 0.25
+UNCHANGED = {"rib_depth": 1.0, "sheet_thickness": 1.0, "yield_stress": 1.0}
 
 
 @cache
@@ -46,7 +48,7 @@ def coupled(step: float) -> tuple[Array, SheetFront]:
     model = load_model("headform", {"surface": "fem", "element_size": DRAFT})
     assert isinstance(model, HeadformModel) and isinstance(model.target, FemTarget)
     target, car = model.target, load_car("family_car_1990s")
-    shells = target.structure({"rib_depth": 1.0, "sheet_thickness": 1.0, "yield_stress": 1.0})
+    shells = target.structure(UNCHANGED)
     body = shells.assemble()
     mesh, zones = with_replaced(car.mesh, shells), len(car.vehicle.zones)
     rows = np.append(laws_of_regions(car.vehicle, car.mesh), zones)
@@ -98,3 +100,21 @@ def test_the_sheet_books_the_work_of_the_body() -> None:
     # What the body lost: its momentum along the normal, by the forces on it.
     lost = 1e-4 * force[:, 0].sum()
     assert MASS * SPEED < lost < 2.0 * MASS * SPEED
+
+
+def test_panels_that_nothing_touches_stay_exactly_at_rest() -> None:
+    _, front = coupled(1e-4)
+    body, state = front.sheet.body, front.sheet.state
+    panels = load_model("headform", {"surface": "fem", "element_size": DRAFT})
+    assert isinstance(panels, HeadformModel) and isinstance(panels.target, FemTarget)
+    names = [panel.name for panel in panels.target.structure(UNCHANGED).panels]
+    assert state[names.index("hood")] != FRESH
+    for name in ("bumper", "grille", "fender right", "windscreen edge"):
+        k = names.index(name)
+        assert state[k] == FRESH, name
+        own = slice(*body.first[NODES, k : k + 2])
+        np.testing.assert_array_equal(body.nodes.position[own], body.start[own])
+    # The headform has left long ago: the hood is stepped no more, and keeps what it was given.
+    assert not body.awake.any()
+    moved = np.abs(body.nodes.position - body.start).max()
+    assert 1e-4 < moved < 0.1

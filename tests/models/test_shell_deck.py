@@ -151,7 +151,6 @@ def test_nodes_of_foreign_files_are_read_as_another_reader_does(name: str) -> No
         ("*PIECEWISE", "", "is no keyword"),
         ("*MAT_PIECEWISE_LINEAR_PLASTICITY", "*MAT_JOHNSON_COOK", "MAT_JOHNSON_COOK is not read"),
         ("1e+21", "  0.3", "fails \\(FAIL 0.3\\)"),
-        ("*BOUNDARY_SPC_SET", "*DATABASE_NOTHING", "is held by nothing"),
         ("         3        16", "         3         4", "element formulation 4"),
         ("         7         3         5", "         7         4         5", "section 4"),
         ("         7         3         5", "         7         3         6", "material 6"),
@@ -179,11 +178,18 @@ def test_what_is_not_read_is_refused_with_its_line(
         assert old in text
         text = text.replace(old, new, 1)
     (folder / "broken.k").write_text(text)
-    table = (folder / "m-s-kg.toml").read_text().replace("m-s-kg.k", "broken.k")
-    (folder / "broken.toml").write_text(table)
     with pytest.raises(ValueError, match=message) as error:
-        load_car(str(folder / "broken.toml"))
+        read_deck(folder / "broken.k", "m-s-kg")
     assert "\n" not in str(error.value)
+
+
+def test_a_panel_that_nothing_holds_is_refused(folder: Path) -> None:
+    text = (folder / "m-s-kg.k").read_text().replace("*BOUNDARY_SPC_SET", "*DATABASE_NOTHING")
+    (folder / "loose.k").write_text(text)
+    table = (folder / "m-s-kg.toml").read_text().replace("m-s-kg.k", "loose.k")
+    (folder / "loose.toml").write_text(table)
+    with pytest.raises(ValueError, match="'hood outer' is held by nothing"):
+        load_car(str(folder / "loose.toml"))
 
 
 def test_what_the_front_does_without_can_be_named(folder: Path) -> None:

@@ -71,12 +71,12 @@ def build_structure(
     panels = []
     for name in panel_names(table) if only is None else only:
         if name == HOOD:
-            sheet, strength, rib = change.factors(HOOD, ribs=True)
+            sheet, strength, rib = change.factors(HOOD)
             panels.append(build_hood(vehicle, table, size, rib=rib, sheet=sheet, strength=strength))
             continue
         entry = next(row for row in table["panels"] if row["name"] == name)
         zone = entry.get("zone", entry["span"][0])
-        sheet, strength, _ = change.factors(zone)
+        sheet, strength, _ = change.factors(zone, backed=True)
         panels += [
             build_panel(
                 vehicle, loft_of(vehicle.name), entry, table["materials"], size, sheet=sheet,

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from models import data
 
-_POWERS: dict[str, float] = data.load("fem.toml")["force_powers"]
+_POWERS: dict[str, dict[str, float]] = data.load("fem.toml")["force_powers"]
 
 
 @dataclass(frozen=True)
@@ -25,22 +25,21 @@ class Change:
     rib: float = 1.0
     force: Mapping[str, float] = field(default_factory=dict)
 
-    def factors(self, zone: str, *, ribs: bool = False) -> tuple[float, float, float]:
+    def factors(self, zone: str, *, backed: bool = False) -> tuple[float, float, float]:
         """Return the factors on thickness, yield stress and rib depth in a zone.
 
-        A factor on force acts by the powers of ``data/fem.toml``; without ribs, their power is the
-        yield stress's.
+        A factor on force acts by the powers of ``data/fem.toml``.
 
         Parameters
         ----------
         zone : str
-        ribs : bool
-            Whether the sheet has ribs.
+        backed : bool
+            Whether borders and backing take the factor on force as well.
         """
         f = self.force.get(zone, 1.0)
-        strength = _POWERS["strength"] + (0.0 if ribs else _POWERS["rib"])
+        power = _POWERS["backed" if backed else "free"]
         return (
-            self.sheet * f ** _POWERS["sheet"],
-            self.strength * f**strength,
-            self.rib * f ** _POWERS["rib"],
+            self.sheet * f ** power["sheet"],
+            self.strength * f ** power["strength"],
+            self.rib * f ** power.get("rib", 0.0),
         )

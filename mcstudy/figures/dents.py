@@ -59,11 +59,15 @@ def draw_dents(scene: SceneLike) -> Figure | None:
             outlines = list(np.stack([corners[..., 1], -corners[..., 0]], axis=-1))
             colours = shown.to_rgba(values)
             axes.add_collection(
-                PolyCollection(outlines, facecolors=colours, edgecolors="none", rasterized=True)
+                PolyCollection(
+                    outlines, facecolors=colours, edgecolors="face", lw=0.3, rasterized=True
+                )
             )
             for place, depth in _deepest(corners.mean(axis=1), values):
+                # Towards the middle: the horizontal axis points to the right side of the car.
+                aside = 18 if place[1] > 0.0 else -48
                 axes.annotate(
-                    f"{depth:.0f} mm", (place[1], -place[0]), xytext=(14, 14),
+                    f"{depth:.0f} mm", (place[1], -place[0]), xytext=(aside, 12),
                     textcoords="offset points", fontsize=8,
                     arrowprops={"arrowstyle": "-", "lw": 0.7},
                     bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": "none", "alpha": 0.8},

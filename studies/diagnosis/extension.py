@@ -1,9 +1,11 @@
 """The extended model as a study file for ``mcstudy run``."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy import special
 
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.measurement.measured_data import Measured
@@ -16,6 +18,8 @@ from studies.kinds import parse_study
 from studies.monte_carlo.schema import MonteCarloStudy
 from studies.sobol.schema import SobolStudy
 
+LEAST = 1e-3
+"""Share of a posterior outside the model's range from which on it is said."""
 RUNS, REPLICATE = 1000, 100
 """Runs of a study file made from data alone."""
 
@@ -78,8 +82,72 @@ Parameters = Mapping[str, Sequence[Mapping[str, Any]]]
 """By cause its fitted parameters, as in ``diagnosis.json``."""
 
 
-def extend(text: str, parameters: Parameters) -> str:
+Ranges = Mapping[str, tuple[float, float]]
+"""Lowest and highest value of inputs of the extended model."""
+
+
+def ranges_of(choice: ModelChoice, parameters: Parameters) -> dict[str, tuple[float, float]]:
+    """Return the ranges of the inputs that the causes add to a model.
+
+    Parameters
+    ----------
+    choice : ModelChoice
+        The model that is diagnosed.
+    parameters : mapping
+        By cause its fitted parameters, as in ``diagnosis.json``.
+    """
+    effects: dict[str, Any] = dict(choice.effects) | {cause: {} for cause in parameters}
+    model = load_model(choice.name, choice.options, effects)
+    wanted = {f"{cause}_{row['name']}" for cause, rows in parameters.items() for row in rows}
+    return {item.name: (item.low, item.high) for item in model.inputs if item.name in wanted}
+
+
+def cut_shares(parameters: Parameters, ranges: Ranges) -> dict[str, float]:
+    """Return by input the share of its posterior outside the model's range, where there is any.
+
+    Parameters
+    ----------
+    parameters : mapping
+        By cause its fitted parameters, as in ``diagnosis.json``.
+    ranges : mapping
+        From ``ranges_of``.
+    """
+    found = {}
+    for cause, rows in parameters.items():
+        for row in rows:
+            name = f"{cause}_{row['name']}"
+            if row["fixed"] or name not in ranges:
+                continue
+            low, high = ranges[name]
+            centre, spread, take = _normal_form(row)
+            inside = special.ndtr((take(high) - centre) / spread) - special.ndtr(
+                (take(low) - centre) / spread
+            )
+            if inside < 1.0 - LEAST:
+                found[name] = float(1.0 - inside)
+    return found
+
+
+def _normal_form(
+    row: Mapping[str, Any],
+) -> tuple[float, float, Callable[[float], float]]:
+    """Return centre and spread of a fitted parameter where it is normal, and how it gets there."""
+    value, low, high = (float(row[key]) for key in ("value", "low", "high"))
+    if row["family"] == "lognormal":
+        spread = max(math.log(high / low) / (2.0 * REACH), 1e-6)
+        return math.log(value), spread, lambda x: math.log(x) if x > 0.0 else -math.inf
+    return value, max((high - low) / (2.0 * REACH), _narrow(value)), float
+
+
+def _narrow(value: float) -> float:
+    """Return the smallest spread of a parameter at a value."""
+    return 1e-6 * abs(value) + 1e-12
+
+
+def extend(text: str, parameters: Parameters, ranges: Ranges) -> str:
     """Return a study file with causes switched on and their fitted parameters uncertain.
+
+    What of a posterior lies outside the model's range is cut off; see ``cut_shares``.
 
     Parameters
     ----------
@@ -87,6 +155,8 @@ def extend(text: str, parameters: Parameters) -> str:
         Study file of the base model (TOML).
     parameters : mapping
         By cause its fitted parameters, as in ``diagnosis.json``.
+    ranges : mapping
+        From ``ranges_of``.
     """
     lines = ["", "# Added by the diagnosis: effects, and the posterior of their parameters."]
     for cause, rows in parameters.items():
@@ -95,21 +165,34 @@ def extend(text: str, parameters: Parameters) -> str:
     for cause, rows in parameters.items():
         for row in rows:
             if not row["fixed"]:
-                lines += _input(f"{cause}_{row['name']}", _distribution(row), row["unit"])
+                name = f"{cause}_{row['name']}"
+                table = _distribution(row, ranges.get(name, (-math.inf, math.inf)))
+                lines += _input(name, table, row["unit"])
     return text.rstrip("\n") + "\n" + "\n".join(lines) + "\n"
 
 
-def _distribution(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the distribution of a fitted parameter as a table of a study file."""
-    value, low, high = (float(row[key]) for key in ("value", "low", "high"))
-    narrow = 1e-6 * abs(value) + 1e-12
+def _distribution(row: Mapping[str, Any], within: tuple[float, float]) -> dict[str, Any]:
+    """Return the distribution of a fitted parameter, cut to a range, as a table of a study file."""
+    centre, spread, take = _normal_form(row)
+    low, high = within
+    # A fit may rest on the edge of the range with its centre beyond.
+    centre = min(max(centre, take(low)), take(high))
+    table: dict[str, Any]
     if row["family"] == "lognormal":
-        sigma = max(float(np.log(high / low)) / (2.0 * REACH), 1e-6)
-        return {"distribution": "lognormal", "median": value, "sigma": sigma}
-    table: dict[str, Any] = {"distribution": "normal", "mean": value}
-    table["sd"] = max((high - low) / (2.0 * REACH), narrow)
+        table = {"distribution": "lognormal", "median": math.exp(centre), "sigma": spread}
+        low = low if low > 0.0 else -math.inf
+    else:
+        table = {"distribution": "normal", "mean": centre, "sd": spread}
     if row["family"] == "uniform":
-        table |= {"low": low - narrow, "high": high + narrow}
+        # Its prior ends where the interval does, unless that lies outside the range.
+        narrow = _narrow(centre)
+        own = float(row["low"]) - narrow, float(row["high"]) + narrow
+        if own[0] < high and own[1] > low:
+            low, high = max(low, own[0]), min(high, own[1])
+    if math.isfinite(low):
+        table["low"] = low
+    if math.isfinite(high):
+        table["high"] = high
     return table
 
 

@@ -105,6 +105,11 @@ def summarise(analysis: Mapping[str, Any]) -> list[str]:
         lines.append(
             f"The extended model is in {analysis['model']['extended']}; 'mcstudy run' takes it."
         )
+    for name, share in analysis["cut"].items():
+        lines.append(
+            f"{100.0 * share:.1f} % of the posterior of {style.words(name)} lies outside the range "
+            "of the model and is cut off in the extended model."
+        )
     if analysis["worth"]:
         lines.append(_best_extra(analysis))
     return lines

@@ -136,10 +136,12 @@ def _write(
     text = extension.base_study(data, choice, problem, folder.path.name)
     folder.write_text(BASE, text)
     before = after = None
+    parameters = {} if finding.best is None else describe(problem, finding.best)
+    ranges = extension.ranges_of(choice, parameters)
     if finding.best is not None:
         say("measuring the gain", quiet=quiet)
         gains = measure_gain(problem, layouts, finding.base, finding.best, quantities(data), seed)
-        longer = extension.checked(extension.extend(text, describe(problem, finding.best)))
+        longer = extension.checked(extension.extend(text, parameters, ranges))
         folder.write_text(EXTENDED, longer)
         before, after = conclusions.conclude(text), conclusions.conclude(longer)
     answer = {
@@ -169,7 +171,8 @@ def _write(
         "titles": {cause.name: cause.title for cause in causes},
         "separated_by": {cause.name: cause.separated_by for cause in causes},
         "model": {"extended": EXTENDED if finding.best is not None else None, "base": BASE},
-        "parameters": {} if finding.best is None else describe(problem, finding.best),
+        "parameters": parameters,
+        "cut": extension.cut_shares(parameters, ranges),
         "gain": [asdict(entry) for entry in gains],
         "conclusions": None
         if before is None or after is None

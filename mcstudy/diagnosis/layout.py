@@ -173,8 +173,8 @@ class Layout:
         """
         return -self._assemble(seen, scores, scatter, measured=False)[0]
 
-    def cosine(self, signal: str, order: int, seen: Observation | None) -> Array:
-        """Return a cosine over the pulse of one signal, whitened (n,).
+    def cosine(self, signal: str, order: int) -> Array:
+        """Return a cosine over the pulse of one signal, as high as its peak, whitened (n,).
 
         Parameters
         ----------
@@ -182,8 +182,6 @@ class Layout:
             Name of the signal.
         order : int
             Half periods over the pulse.
-        seen : Observation or None
-            Simulated test whose signal it is multiplied with; None scales it to the measured peak.
         """
         parts = []
         begin, end = self.window
@@ -192,12 +190,39 @@ class Layout:
             if channel.name == signal:
                 phase = (channel.time - begin) / (end - begin)
                 inside = (phase >= 0.0) & (phase <= 1.0)
-                values[inside] = np.cos(np.pi * order * phase[inside])
-                if seen is None:
-                    values *= np.abs(channel.values).max()
-                else:
-                    time, shape = seen.signals[signal]
-                    values *= np.interp(channel.time - self.shift, time, shape)
+                peak = np.abs(channel.values).max()
+                values[inside] = peak * np.cos(np.pi * order * phase[inside])
+            parts.append(_whiten(values[:, None], channel.sd, channel.correlation)[:, 0])
+        return np.concatenate([*parts, np.zeros(len(self.test.scalars))])
+
+    def factor(self, signal: str, order: int, seen: Observation, scores: Array) -> Array:
+        """Return the product of one simulated signal and a cosine over its pulse, whitened (n,).
+
+        The cosine goes on as it ends beyond the pulse, as the repeatability does: a change that all
+        tests share must not look like one of each test.
+
+        Parameters
+        ----------
+        signal : str
+            Name of the signal.
+        order : int
+            Half periods over the pulse.
+        seen : Observation
+            Simulated test.
+        scores : (q,) array
+            Latents of the test's nuisances.
+        """
+        parts = []
+        begin, end = self.window
+        origin = self.shift + TIME_ORIGIN * scores[len(self.test.doubtful)]
+        for channel in self.test.signals:
+            values = np.zeros(channel.time.size)
+            if channel.name == signal:
+                phase = np.clip((channel.time - begin) / (end - begin), 0.0, 1.0)
+                time, shape = seen.signals[signal]
+                values = np.cos(np.pi * order * phase) * np.interp(
+                    channel.time - origin, time, shape
+                )
             parts.append(_whiten(values[:, None], channel.sd, channel.correlation)[:, 0])
         return np.concatenate([*parts, np.zeros(len(self.test.scalars))])
 

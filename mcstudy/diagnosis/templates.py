@@ -217,8 +217,11 @@ def _discrepancy(
             for order in orders:
                 names.append(f"{signal.name} cosine {order} x {factor_name}")
                 for i, layout in enumerate(layouts):
-                    seen = fitted.observations[i] if shaped else None
-                    shape = layout.cosine(signal.name, order, seen)
+                    if shaped:
+                        seen, own = fitted.observations[i], fitted.scores.own[i]
+                        shape = layout.factor(signal.name, order, seen, own)
+                    else:
+                        shape = layout.cosine(signal.name, order)
                     columns[i].append(SIZE * factor[i] * shape)
         for scalar in test.scalars if shaped else ():
             names.append(f"{scalar.name} x {factor_name}")

@@ -7,9 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mcstudy.diagnosis.search import fit_base
 from mcstudy.measurement.measured_data import load_measured
 from models.registry import load_model
 from studies.diagnosis.causes import causes_of
+from studies.diagnosis.model_choice import choose_model
+from studies.diagnosis.problem import build_problem
+from studies.diagnosis.study import simulation_of
 from studies.validation.diagnosis.drawing import CATALOGUE, KINDS, OUTSIDE, draw
 from studies.validation.diagnosis.hidden_effects import CURVE, Hidden, Laboratory, make_tests
 from studies.validation.diagnosis.tier import TARGETS, analyse, plan
@@ -130,6 +134,20 @@ def test_nothing_hidden_nothing_named(monkeypatch: pytest.MonkeyPatch) -> None:
     outcome = trial([], 23, monkeypatch)
     assert outcome.named == ()
     assert outcome.size == 0.0
+
+
+@pytest.mark.parametrize("factor", [0.88, 1.06, 1.12])
+@pytest.mark.parametrize("seed", [5, 7])
+def test_a_gain_of_all_tests_is_not_taken_for_repeatability(
+    factor: float, seed: int, tmp_path: Path
+) -> None:
+    gain = Hidden("sensor_gain", "catalogue", {"factor": factor})
+    make_tests(tmp_path / "tests", [gain], seed, Laboratory())
+    data = load_measured(tmp_path / "tests")
+    choice = choose_model(data, None)
+    _, base = fit_base(build_problem(data, choice, simulation_of(data, choice)))
+    # The tests differ by 1 % of their level.
+    assert 0.006 < base.scatter.level < 0.02
 
 
 def outcome_of(kind: str, names: tuple[str, ...], cause: str | None, **more: Any) -> Outcome:

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from builders import Array
 
+from models.crash.ellipsoids import Ellipsoids
 from models.crash.facet_survey import empty_findings
-from models.crash.sheet import FRESH, SLID, STEPS, WORK, booked_energy, build_sheet
+from models.crash.sheet import FRESH, NOW, SLID, STEPS, WORK, booked_energy, build_sheet
 from models.crash.sheet_front import SheetFront
+from models.crash.sheet_motion import clear_impulses, find_candidates, follow_bodies
 from models.crash.surfaces import CHANNELS, empty_contacts
 from models.criteria import head_injury_criterion
 from models.criteria.units import STANDARD_GRAVITY
@@ -43,8 +45,9 @@ def stepped_together() -> tuple[float, float]:
     return run.outputs["hic15"], run.outputs["peak_force"]
 
 
-def coupled(step: float) -> tuple[Array, SheetFront]:
-    """Return the forces (n, 3) on a headform that is stepped by itself, and its front."""
+@cache
+def coupled(step: float) -> tuple[Array, SheetFront, Ellipsoids]:
+    """Return the forces (n, 3) on a headform stepped by itself, its front and its surface."""
     model = load_model("headform", {"surface": "fem", "element_size": DRAFT})
     assert isinstance(model, HeadformModel) and isinstance(model.target, FemTarget)
     target, car = model.target, load_car("family_car_1990s")
@@ -78,12 +81,12 @@ def coupled(step: float) -> tuple[Array, SheetFront]:
         moving(centre, SPEED * heading), empty_loads(1), empty_contacts(1, zones, 0),
         np.zeros(CHANNELS), np.zeros((2, 3)), np.zeros(6), axes, step, 1, record, summary,
     )  # fmt: skip
-    return record[: int(summary[SAMPLES]), FORCE:], front
+    return record[: int(summary[SAMPLES]), FORCE:], front, ellipsoids
 
 
 @pytest.mark.parametrize(("step", "within"), [(5e-5, 0.015), (1e-4, 0.02)])
 def test_exchange_at_the_bodys_steps_gives_the_same_head_injury(step: float, within: float) -> None:
-    force, front = coupled(step)
+    force, front, _ = coupled(step)
     g = np.linalg.norm(force, axis=1) / (MASS * STANDARD_GRAVITY)
     hic = head_injury_criterion(step * np.arange(len(g)), g, 0.015)[0]
     expected, _ = stepped_together()
@@ -93,7 +96,7 @@ def test_exchange_at_the_bodys_steps_gives_the_same_head_injury(step: float, wit
 
 
 def test_the_sheet_books_the_work_of_the_body() -> None:
-    force, front = coupled(1e-4)
+    force, front, _ = coupled(1e-4)
     account = front.sheet.account
     assert account[WORK] == pytest.approx(booked_energy(front.sheet), rel=0.01)
     assert account[SLID] >= 0.0
@@ -103,7 +106,7 @@ def test_the_sheet_books_the_work_of_the_body() -> None:
 
 
 def test_panels_that_nothing_touches_stay_exactly_at_rest() -> None:
-    _, front = coupled(1e-4)
+    _, front, _ = coupled(1e-4)
     body, state = front.sheet.body, front.sheet.state
     panels = load_model("headform", {"surface": "fem", "element_size": DRAFT})
     assert isinstance(panels, HeadformModel) and isinstance(panels.target, FemTarget)
@@ -114,7 +117,38 @@ def test_panels_that_nothing_touches_stay_exactly_at_rest() -> None:
         assert state[k] == FRESH, name
         own = slice(*body.first[NODES, k : k + 2])
         np.testing.assert_array_equal(body.nodes.position[own], body.start[own])
-    # The headform has left long ago: the hood is stepped no more, and keeps what it was given.
-    assert not body.awake.any()
-    moved = np.abs(body.nodes.position - body.start).max()
-    assert 1e-4 < moved < 0.1
+    assert [names[k] for k in np.flatnonzero(body.awake)] == ["hood"]
+
+
+def test_a_hood_free_of_loads_is_put_to_rest_and_a_blow_wakes_it() -> None:
+    # A front of its own: it goes on moving.
+    _, front, ellipsoids = coupled.__wrapped__(1e-4)
+    sheet, time = front.sheet, float(front.sheet.clock[NOW])
+    below = sheet.present.copy()
+
+    def go_on(steps: int) -> None:
+        nonlocal time
+        for _ in range(steps):
+            time += 1e-4
+            clear_impulses(sheet)
+            find_candidates(sheet, front.skin.reach)
+            follow_bodies(sheet, ellipsoids, front.friction, front.spins, time)
+            sheet.clock[NOW] = time
+            sheet.past[:] = sheet.present
+
+    sheet.present[:, 2] += 1.0
+    sheet.past[:] = sheet.present
+    go_on(500)
+    hood = slice(0, int(sheet.body.first[NODES, 1]))
+    assert not sheet.body.awake.any()
+    assert not sheet.body.nodes.velocity[hood].any()
+    # What moved when it was stopped stays booked.
+    assert sheet.account[WORK] == pytest.approx(booked_energy(sheet), rel=0.01)
+    shape = sheet.body.nodes.position.copy()
+    go_on(50)
+    np.testing.assert_array_equal(sheet.body.nodes.position, shape)
+    sheet.present[:] = below
+    sheet.present[:, 2] -= 0.03
+    sheet.past[:] = sheet.present
+    go_on(3)
+    assert sheet.body.awake[0]

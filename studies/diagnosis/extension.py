@@ -10,6 +10,7 @@ from scipy import special
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.measurement.measured_data import Measured
 from mcstudy.statistics import REACH
+from mcstudy.studyfile.schema import CommonStudy
 from models.crash.outcome import ANGULAR_CLASS, LINEAR_CLASS
 from models.registry import load_model
 from studies.diagnosis.model_choice import ModelChoice
@@ -86,18 +87,22 @@ Ranges = Mapping[str, tuple[float, float]]
 """Lowest and highest value of inputs of the extended model."""
 
 
-def ranges_of(choice: ModelChoice, parameters: Parameters) -> dict[str, tuple[float, float]]:
-    """Return the ranges of the inputs that the causes add to a model.
+def ranges_of(text: str, parameters: Parameters) -> dict[str, tuple[float, float]]:
+    """Return the ranges of the inputs that the causes add to the model of a study.
 
     Parameters
     ----------
-    choice : ModelChoice
-        The model that is diagnosed.
+    text : str
+        Study file of the base model (TOML).
     parameters : mapping
         By cause its fitted parameters, as in ``diagnosis.json``.
     """
-    effects: dict[str, Any] = dict(choice.effects) | {cause: {} for cause in parameters}
-    model = load_model(choice.name, choice.options, effects)
+    if not parameters:
+        return {}
+    study = parse_study(text, "base model")
+    assert isinstance(study, CommonStudy)
+    effects: dict[str, Any] = dict(study.effects) | {cause: {} for cause in parameters}
+    model = load_model(study.model.name, study.model.options, effects)
     wanted = {f"{cause}_{row['name']}" for cause, rows in parameters.items() for row in rows}
     return {item.name: (item.low, item.high) for item in model.inputs if item.name in wanted}
 
@@ -144,7 +149,7 @@ def _narrow(value: float) -> float:
     return 1e-6 * abs(value) + 1e-12
 
 
-def extend(text: str, parameters: Parameters, ranges: Ranges) -> str:
+def extend(text: str, parameters: Parameters) -> str:
     """Return a study file with causes switched on and their fitted parameters uncertain.
 
     What of a posterior lies outside the model's range is cut off; see ``cut_shares``.
@@ -155,9 +160,8 @@ def extend(text: str, parameters: Parameters, ranges: Ranges) -> str:
         Study file of the base model (TOML).
     parameters : mapping
         By cause its fitted parameters, as in ``diagnosis.json``.
-    ranges : mapping
-        From ``ranges_of``.
     """
+    ranges = ranges_of(text, parameters)
     lines = ["", "# Added by the diagnosis: effects, and the posterior of their parameters."]
     for cause, rows in parameters.items():
         lines += ["", f"[effects.{cause}]"]

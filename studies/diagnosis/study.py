@@ -137,11 +137,11 @@ def _write(
     folder.write_text(BASE, text)
     before = after = None
     parameters = {} if finding.best is None else describe(problem, finding.best)
-    ranges = extension.ranges_of(choice, parameters)
+    ranges = extension.ranges_of(text, parameters)
     if finding.best is not None:
         say("measuring the gain", quiet=quiet)
         gains = measure_gain(problem, layouts, finding.base, finding.best, quantities(data), seed)
-        longer = extension.checked(extension.extend(text, parameters, ranges))
+        longer = extension.checked(extension.extend(text, parameters))
         folder.write_text(EXTENDED, longer)
         before, after = conclusions.conclude(text), conclusions.conclude(longer)
     answer = {

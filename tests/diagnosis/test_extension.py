@@ -48,9 +48,8 @@ def test_no_draw_of_an_extended_model_lies_outside_its_range(
 ) -> None:
     model = load_model("headform", {}, {"sensor_filter": {}})
     item = next(item for item in model.inputs if item.name == INPUT)
-    ranges = {INPUT: (item.low, item.high)}
     parameters = {"sensor_filter": [row(value, value / spread, value * spread, family)]}
-    study = parse_study(extend(BASE, parameters, ranges), "extended")
+    study = parse_study(extend(BASE, parameters), "extended")
     assert isinstance(study, MonteCarloStudy)
     # As the runner does: it refuses any value outside the range.
     uniforms = (np.arange(1000)[:, None] + 0.5) / 1000.0 * np.ones((1, 2))

@@ -97,6 +97,7 @@ def test_the_energy_of_a_hit_is_all_booked_and_the_hood_keeps_a_dent() -> None:
     assert found["rebound_speed"] < 6.0
 
 
+@pytest.mark.slow
 def test_left_and_right_are_alike() -> None:
     right = outputs(lateral_position=-0.6)
     for name in ("hic15", "clip_3ms", "hood_intrusion"):

@@ -84,7 +84,10 @@ def coupled(step: float) -> tuple[Array, SheetFront, Ellipsoids]:
     return record[: int(summary[SAMPLES]), FORCE:], front, ellipsoids
 
 
-@pytest.mark.parametrize(("step", "within"), [(5e-5, 0.015), (1e-4, 0.02)])
+@pytest.mark.parametrize(
+    ("step", "within"),
+    [pytest.param(5e-5, 0.015, marks=pytest.mark.slow), (1e-4, 0.02)],
+)
 def test_exchange_at_the_bodys_steps_gives_the_same_head_injury(step: float, within: float) -> None:
     force, front, _ = coupled(step)
     g = np.linalg.norm(force, axis=1) / (MASS * STANDARD_GRAVITY)

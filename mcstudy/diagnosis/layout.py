@@ -6,14 +6,14 @@ time and one factor a scalar. All are standard-normal latents.
 """
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from mcstudy.diagnosis.problem import Observation, Test
+from mcstudy.diagnosis.problem import Observation, Signal, Test
 
 Array = NDArray[np.float64]
 
@@ -183,17 +183,13 @@ class Layout:
         order : int
             Half periods over the pulse.
         """
-        parts = []
-        begin, end = self.window
-        for channel in self.test.signals:
-            values = np.zeros(channel.time.size)
-            if channel.name == signal:
-                phase = (channel.time - begin) / (end - begin)
-                inside = (phase >= 0.0) & (phase <= 1.0)
-                peak = np.abs(channel.values).max()
-                values[inside] = peak * np.cos(np.pi * order * phase[inside])
-            parts.append(_whiten(values[:, None], channel.sd, channel.correlation)[:, 0])
-        return np.concatenate([*parts, np.zeros(len(self.test.scalars))])
+
+        def values(channel: Signal, phase: Array) -> Array:
+            inside = (phase >= 0.0) & (phase <= 1.0)
+            peak = np.abs(channel.values).max()
+            return np.asarray(peak * np.cos(np.pi * order * phase) * inside)
+
+        return self._of_signal(signal, values)
 
     def factor(self, signal: str, order: int, seen: Observation, scores: Array) -> Array:
         """Return the product of one simulated signal and a cosine over its pulse, whitened (n,).
@@ -212,19 +208,14 @@ class Layout:
         scores : (q,) array
             Latents of the test's nuisances.
         """
-        parts = []
-        begin, end = self.window
         origin = self.shift + TIME_ORIGIN * scores[len(self.test.doubtful)]
-        for channel in self.test.signals:
-            values = np.zeros(channel.time.size)
-            if channel.name == signal:
-                phase = np.clip((channel.time - begin) / (end - begin), 0.0, 1.0)
-                time, shape = seen.signals[signal]
-                values = np.cos(np.pi * order * phase) * np.interp(
-                    channel.time - origin, time, shape
-                )
-            parts.append(_whiten(values[:, None], channel.sd, channel.correlation)[:, 0])
-        return np.concatenate([*parts, np.zeros(len(self.test.scalars))])
+        time, shape = seen.signals[signal]
+
+        def values(channel: Signal, phase: Array) -> Array:
+            wave = np.cos(np.pi * order * np.clip(phase, 0.0, 1.0))
+            return np.asarray(wave * np.interp(channel.time - origin, time, shape))
+
+        return self._of_signal(signal, values)
 
     def part(self, signal: str, window: int, windows: int) -> Array:
         """Return a box over one of equal parts of the pulse, as high as the peak, whitened (n,).
@@ -238,14 +229,27 @@ class Layout:
         windows : int
             Number of parts.
         """
-        parts = []
         begin, end = self.window
+
+        def values(channel: Signal, _phase: Array) -> Array:
+            place = windows * (channel.time - begin) / (end - begin)
+            inside = (place >= window) & (place < window + 1)
+            return np.asarray(np.abs(channel.values).max() * inside)
+
+        return self._of_signal(signal, values)
+
+    def _of_signal(self, signal: str, values: Callable[[Signal, Array], Array]) -> Array:
+        """Return the whitened vector (n,) with the values of one signal and zeros elsewhere.
+
+        ``values`` takes the signal and the phase of its samples, 0 to 1 over the pulse.
+        """
+        begin, end = self.window
+        parts = []
         for channel in self.test.signals:
-            values = np.zeros(channel.time.size)
+            table = np.zeros((channel.time.size, 1))
             if channel.name == signal:
-                phase = windows * (channel.time - begin) / (end - begin)
-                values[(phase >= window) & (phase < window + 1)] = np.abs(channel.values).max()
-            parts.append(_whiten(values[:, None], channel.sd, channel.correlation)[:, 0])
+                table[:, 0] = values(channel, (channel.time - begin) / (end - begin))
+            parts.append(_whiten(table, channel.sd, channel.correlation)[:, 0])
         return np.concatenate([*parts, np.zeros(len(self.test.scalars))])
 
     def unwhiten(self, vector: Array) -> dict[str, Array]:

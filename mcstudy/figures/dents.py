@@ -12,8 +12,6 @@ from mcstudy.figures.crash import CAR, MeshLike, SceneLike
 
 Array = NDArray[np.float64]
 
-COLOURS = "rocket_r"
-"""Sequential palette, light to dark: it reads in grey and with every colour vision."""
 DEPTHS = 3
 """Number of dents whose depth is written."""
 APART = 0.2
@@ -54,7 +52,7 @@ def draw_dents(scene: SceneLike) -> Figure | None:
         grid = figure.subplots(1, 2, sharex=True, sharey=True)
         for axes, (title, values) in zip(grid, panels.items(), strict=True):
             scale = Normalize(0.0, max(float(values.max()), LEAST))
-            shown = ScalarMappable(scale, COLOURS)
+            shown = ScalarMappable(scale, style.SEQUENTIAL)
             # Seen from above with the car's front below: y to the left, x upwards is rearwards.
             outlines = list(np.stack([corners[..., 1], -corners[..., 0]], axis=-1))
             colours = shown.to_rgba(values)

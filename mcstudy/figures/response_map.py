@@ -20,8 +20,6 @@ from mcstudy.text import number
 
 Array = NDArray[np.float64]
 
-COLOURS = "rocket_r"
-"""Sequential palette, light to dark: it reads in grey and with every colour vision."""
 FILL = 0.86
 """Share of the distance of two places that the square of a place fills."""
 WRITTEN = 400
@@ -88,7 +86,7 @@ class Scale:
 
     def colours(self, values: Array) -> tuple[Any, Colormap]:
         """Return the norm and the colours for values."""
-        palette = mpl.colormaps[COLOURS]
+        palette = mpl.colormaps[style.SEQUENTIAL]
         if self.limits:
             count = len(self.limits) + 1
             shades = ListedColormap([palette(0.08 + 0.84 * k / (count - 1)) for k in range(count)])

@@ -24,6 +24,8 @@ from mcstudy.statistics import varies
 # Okabe and Ito's palette, distinguishable with all common colour vision deficiencies.
 BLUE, ORANGE, GREEN, RED = "#0072B2", "#E69F00", "#009E73", "#D55E00"
 SKY, PURPLE, YELLOW, GREY = "#56B4E9", "#CC79A7", "#F0E442", "#6B6B6B"
+SEQUENTIAL = "rocket_r"
+"""Sequential palette, light to dark: it reads in grey and with every colour vision."""
 PALETTE = (BLUE, ORANGE, GREEN, RED, SKY, PURPLE, "#000000", "#8C6D31")
 
 _RC: dict[str, Any] = {

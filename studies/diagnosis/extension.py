@@ -1,7 +1,7 @@
 """The extended model as a study file for ``mcstudy run``."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -85,6 +85,8 @@ Parameters = Mapping[str, Sequence[Mapping[str, Any]]]
 
 Ranges = Mapping[str, tuple[float, float]]
 """Lowest and highest value of inputs of the extended model."""
+EVERYWHERE = (-math.inf, math.inf)
+"""Range of an input that has none."""
 
 
 def ranges_of(text: str, parameters: Parameters) -> dict[str, tuple[float, float]]:
@@ -103,7 +105,7 @@ def ranges_of(text: str, parameters: Parameters) -> dict[str, tuple[float, float
     assert isinstance(study, CommonStudy)
     effects: dict[str, Any] = dict(study.effects) | {cause: {} for cause in parameters}
     model = load_model(study.model.name, study.model.options, effects)
-    wanted = {f"{cause}_{row['name']}" for cause, rows in parameters.items() for row in rows}
+    wanted = {name for name, _ in _uncertain(parameters)}
     return {item.name: (item.low, item.high) for item in model.inputs if item.name in wanted}
 
 
@@ -118,19 +120,23 @@ def cut_shares(parameters: Parameters, ranges: Ranges) -> dict[str, float]:
         From ``ranges_of``.
     """
     found = {}
+    for name, row in _uncertain(parameters):
+        low, high = ranges.get(name, EVERYWHERE)
+        centre, spread, take = _normal_form(row)
+        inside = special.ndtr((take(high) - centre) / spread) - special.ndtr(
+            (take(low) - centre) / spread
+        )
+        if inside < 1.0 - LEAST:
+            found[name] = float(1.0 - inside)
+    return found
+
+
+def _uncertain(parameters: Parameters) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield input name and row of each parameter that is not fixed."""
     for cause, rows in parameters.items():
         for row in rows:
-            name = f"{cause}_{row['name']}"
-            if row["fixed"] or name not in ranges:
-                continue
-            low, high = ranges[name]
-            centre, spread, take = _normal_form(row)
-            inside = special.ndtr((take(high) - centre) / spread) - special.ndtr(
-                (take(low) - centre) / spread
-            )
-            if inside < 1.0 - LEAST:
-                found[name] = float(1.0 - inside)
-    return found
+            if not row["fixed"]:
+                yield f"{cause}_{row['name']}", row
 
 
 def _normal_form(
@@ -166,12 +172,9 @@ def extend(text: str, parameters: Parameters) -> str:
     for cause, rows in parameters.items():
         lines += ["", f"[effects.{cause}]"]
         lines += [f"{row['name']} = {float(row['value'])!r}" for row in rows]
-    for cause, rows in parameters.items():
-        for row in rows:
-            if not row["fixed"]:
-                name = f"{cause}_{row['name']}"
-                table = _distribution(row, ranges.get(name, (-math.inf, math.inf)))
-                lines += _input(name, table, row["unit"])
+    for name, row in _uncertain(parameters):
+        table = _distribution(row, ranges.get(name, EVERYWHERE))
+        lines += _input(name, table, row["unit"])
     return text.rstrip("\n") + "\n" + "\n".join(lines) + "\n"
 
 

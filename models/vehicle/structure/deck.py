@@ -73,10 +73,8 @@ class Deck:
         m.
     materials : Materials
         One row a part.
-    rigid : (parts,) array of bool
-        Parts of rigid material: they do not move.
     held : (n,) array of bool
-        Nodes that do not move.
+        Nodes that do not move: those fixed, and those of rigid parts.
     notes : list of str
         What was left out or changed.
     digest : str
@@ -89,7 +87,6 @@ class Deck:
     names: tuple[str, ...]
     thickness: Array
     materials: Materials
-    rigid: NDArray[np.bool_]
     held: NDArray[np.bool_]
     notes: list[str]
     digest: str
@@ -143,7 +140,7 @@ def read_deck(path: Path, units: str, ignore: Collection[str] = ()) -> Deck:
         position=position, elements=elements, part=part.reshape(-1),
         names=tuple(row[0] for row in rows), thickness=np.array([row[1] for row in rows]),
         materials=Materials(*(np.array(c) for c in zip(*(row[2] for row in rows), strict=True))),
-        rigid=rigid, held=held, notes=notes, digest=digest.hexdigest()[:12],
+        held=held, notes=notes, digest=digest.hexdigest()[:12],
     )  # fmt: skip
 
 

@@ -79,11 +79,6 @@ class Structure:
         """Number of elements."""
         return sum(len(panel.elements) for panel in self.panels)
 
-    def panel_index(self, name: str) -> int:
-        """Return the number of a panel, or -1 if there is none of that name."""
-        names = [panel.name for panel in self.panels]
-        return names.index(name) if name in names else -1
-
     def assemble(self, points: int = 3) -> Assembly:
         """Return the panels at rest, all asleep.
 

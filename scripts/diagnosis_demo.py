@@ -29,7 +29,8 @@ from studies.injury.schema import InjuryStudy
 from studies.injury.study import Injury
 from studies.kinds import parse_study
 from studies.publishing import publish
-from studies.validation.diagnosis.hidden_effects import Hidden, make_tests
+from studies.validation.diagnosis.hidden_effects import make_tests
+from studies.validation.diagnosis.laboratory import Hidden
 
 INJURY_STUDY = Path("configs/demo_injury.toml")
 RESULTS = Path("results/diagnose_demo")

@@ -20,7 +20,8 @@ from studies.diagnosis.problem import build_problem
 from studies.diagnosis.study import diagnose, simulation_of
 from studies.validation.diagnosis.hidden_accidents import make_accidents
 from studies.validation.diagnosis.hidden_crashes import make_crashes
-from studies.validation.diagnosis.hidden_effects import CURVE, Hidden, Laboratory, make_tests
+from studies.validation.diagnosis.hidden_effects import make_tests
+from studies.validation.diagnosis.laboratory import CURVE, Hidden, Laboratory
 
 ACCIDENTS = Path("configs/accidents.toml")
 

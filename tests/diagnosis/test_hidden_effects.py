@@ -15,7 +15,8 @@ from studies.diagnosis.model_choice import choose_model
 from studies.diagnosis.problem import build_problem
 from studies.diagnosis.study import simulation_of
 from studies.validation.diagnosis.drawing import CATALOGUE, KINDS, OUTSIDE, draw
-from studies.validation.diagnosis.hidden_effects import CURVE, Hidden, Laboratory, make_tests
+from studies.validation.diagnosis.hidden_effects import make_tests
+from studies.validation.diagnosis.laboratory import CURVE, Hidden, Laboratory
 from studies.validation.diagnosis.tier import TARGETS, analyse, plan
 from studies.validation.diagnosis.trial import Outcome, Trial, run_trial
 
@@ -66,7 +67,7 @@ def test_what_is_hidden_depends_on_the_seed_alone() -> None:
     for kind in KINDS:
         assert draw(3, kind) == draw(3, kind)
     assert draw(1, "none") == []
-    assert {h.name for k in range(40) for h in draw(k, "catalogue")} == set(CATALOGUE)
+    assert {h.name for k in range(90) for h in draw(k, "own form")} == set(CATALOGUE)
     assert {h.name for k in range(40) for h in draw(k, "outside")} == {
         make(np.random.default_rng(0)).name for make in OUTSIDE
     }
@@ -75,7 +76,7 @@ def test_what_is_hidden_depends_on_the_seed_alone() -> None:
 
 def trial(hidden: list[Hidden], seed: int, monkeypatch: pytest.MonkeyPatch) -> Outcome:
     monkeypatch.setattr("studies.validation.diagnosis.trial.draw", lambda _seed, _kind: hidden)
-    return run_trial(Trial(seed, "catalogue", force=False))
+    return run_trial(Trial(seed, "own form", force=False))
 
 
 BOTTOMING = Hidden("hood_bottoming", "catalogue", {"clearance": 0.03, "stiffness": 2e5})
@@ -85,8 +86,8 @@ CATALOGUED = [
     Hidden("rate_dependent_hood", "dashpot", {"damping": 40.0}),
     Hidden("sensor_saturation", "catalogue", {"limit": 110.0}),
 ]
-AGEING = Hidden("ageing", "", {"loss": 0.03})
-FOREIGN = [Hidden("ageing", "", {"loss": 0.01}), Hidden("cable", "", {"size": 0.8})]
+AGEING = Hidden("hood_force_scale", "ageing", {"loss": 0.15})
+FOREIGN = [Hidden("rupture", "", {"depth": 0.02, "share": 0.1}), Hidden("cable", "", {"size": 0.8})]
 
 
 @pytest.mark.parametrize(
@@ -163,9 +164,9 @@ def test_rates_count_what_they_say() -> None:
     outcomes = [
         outcome_of("none", (), None),
         outcome_of("none", (), "sensor_gain"),
-        outcome_of("catalogue", ("sensor_gain",), "sensor_gain"),
-        outcome_of("catalogue", ("sensor_gain",), "speed_bias"),
-        outcome_of("catalogue", ("time_scale",), "speed_bias",
+        outcome_of("own form", ("sensor_gain",), "sensor_gain"),
+        outcome_of("own form", ("sensor_gain",), "speed_bias"),
+        outcome_of("own form", ("time_scale",), "speed_bias",
                    ambiguous=("speed_bias", "time_scale")),
         outcome_of("outside", ("cable",), "unexplained"),
         outcome_of("outside", ("cable",), "sensor_filter"),

@@ -24,7 +24,8 @@ from studies.diagnosis.model_choice import choose_model
 from studies.diagnosis.study import diagnose
 from studies.kinds import load_study
 from studies.monte_carlo.schema import MonteCarloStudy
-from studies.validation.diagnosis.hidden_effects import Hidden, Laboratory, make_tests
+from studies.validation.diagnosis.hidden_effects import make_tests
+from studies.validation.diagnosis.laboratory import Hidden, Laboratory
 
 LABORATORY = Laboratory(tests=8)
 FEW = ("sensor_gain", "hood_bottoming", "rate_dependent_hood", "mass_error", "sensor_offset")

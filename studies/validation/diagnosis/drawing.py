@@ -1,35 +1,48 @@
-"""Hidden effects of a set of tests, drawn from a seed unknown to the diagnosis."""
+"""Hidden effects of a set of tests, drawn from a seed unknown to the diagnosis.
+
+Own forms are those that the catalogue has; foreign forms are other functions of the same cause.
+Sizes reach from about half the smallest visible one to more than ten times it.
+"""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
-from studies.validation.diagnosis.hidden_effects import Hidden
+from studies.validation.diagnosis.laboratory import Hidden
 
 Draw = Callable[[np.random.Generator], Hidden]
-
-
-def _sign(rng: np.random.Generator) -> float:
-    return float(rng.choice([-1.0, 1.0]))
+Range = tuple[float, float]
 
 
 def _between(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
+def _drawn(
+    name: str,
+    form: str,
+    signed: tuple[str, ...],
+    ranges: dict[str, Range],
+    rng: np.random.Generator,
+) -> Hidden:
+    numbers = {key: _between(rng, *limits) for key, limits in ranges.items()}
+    for key in signed:
+        numbers[key] *= float(rng.choice([-1.0, 1.0]))
+    if "excess" in numbers:
+        numbers["factor"] = 1.0 + numbers.pop("excess")
+    return Hidden(name, form, numbers)
+
+
+def _one(name: str, form: str, *signed: str, **ranges: Range) -> Draw:
+    """Return the draw of a form; numbers that are ``signed`` have a random sign."""
+    return partial(_drawn, name, form, signed, ranges)
+
+
 def _factor(name: str, low: float, high: float) -> Draw:
-    return lambda rng: Hidden(
-        name, "catalogue", {"factor": 1.0 + _sign(rng) * _between(rng, low, high)}
-    )
+    return _one(name, "catalogue", "excess", excess=(low, high))
 
 
-def _one(name: str, form: str, **ranges: tuple[float, float]) -> Draw:
-    return lambda rng: Hidden(
-        name, form, {key: _between(rng, *limits) for key, limits in ranges.items()}
-    )
-
-
-# Sizes from about the minimum detectable effect to some ten times that.
 CATALOGUE: dict[str, list[Draw]] = {
     "hood_bottoming": [
         _one("hood_bottoming", "catalogue", clearance=(0.028, 0.040), stiffness=(4e4, 4e5)),
@@ -39,37 +52,75 @@ CATALOGUE: dict[str, list[Draw]] = {
         _one("hood_yield", "catalogue", force=(2500.0, 3400.0), remaining=(0.1, 0.6)),
     ],
     "rate_dependent_hood": [
-        _one("rate_dependent_hood", "dashpot", damping=(2.0, 25.0)),
-        _one("rate_dependent_hood", "relative", per_speed=(0.0008, 0.012)),
-        _one("rate_dependent_hood", "power", share=(0.008, 0.1), exponent=(0.25, 0.4)),
+        _one("rate_dependent_hood", "dashpot", damping=(2.0, 80.0)),
+        _one("rate_dependent_hood", "relative", per_speed=(0.0008, 0.03)),
+        _one("rate_dependent_hood", "power", share=(0.008, 0.25), exponent=(0.25, 0.4)),
     ],
-    "unloading_slope": [_factor("unloading_slope", 0.02, 0.25)],
-    "sensor_gain": [_factor("sensor_gain", 0.006, 0.06)],
-    "sensor_offset": [
-        lambda rng: Hidden(
-            "sensor_offset", "catalogue", {"offset": _sign(rng) * _between(rng, 0.3, 4.0)}
-        )
+    "hood_inertia": [
+        _one("hood_inertia", "catalogue", mass=(0.01, 0.6), depth=(0.006, 0.012)),
     ],
-    "sensor_saturation": [_one("sensor_saturation", "catalogue", limit=(110.0, 165.0))],
-    "sensor_filter": [_one("sensor_filter", "catalogue", channel_class=(250.0, 900.0))],
-    "time_scale": [_factor("time_scale", 0.005, 0.05)],
-    "speed_bias": [_factor("speed_bias", 0.006, 0.05)],
-    "mass_error": [_factor("mass_error", 0.005, 0.06)],
+    "skin_compliance": [
+        _one("skin_compliance", "catalogue", compliance=(2e-8, 8e-7)),
+    ],
+    "unloading_slope": [_factor("unloading_slope", 0.02, 0.4)],
+    "hood_force_scale": [_factor("hood_force_scale", 0.1, 0.4)],
+    "sensor_gain": [_factor("sensor_gain", 0.006, 0.15)],
+    "sensor_offset": [_one("sensor_offset", "catalogue", "offset", offset=(0.3, 6.0))],
+    "sensor_saturation": [_one("sensor_saturation", "catalogue", limit=(80.0, 165.0))],
+    "sensor_filter": [_one("sensor_filter", "catalogue", channel_class=(100.0, 900.0))],
+    "time_scale": [_factor("time_scale", 0.005, 0.1)],
+    "speed_bias": [_factor("speed_bias", 0.006, 0.12)],
+    "mass_error": [_factor("mass_error", 0.005, 0.23)],
 }
-OTHER_FORMS: dict[str, list[Draw]] = {
+FOREIGN: dict[str, list[Draw]] = {
     "hood_bottoming": [
         _one("hood_bottoming", "hertz", clearance=(0.026, 0.038), stiffness=(1e5, 6e5)),
+        _one("hood_bottoming", "soft_start", clearance=(0.024, 0.036), stiffness=(6e4, 6e5),
+             layer=(0.003, 0.01)),
+        _one("hood_bottoming", "hardening", clearance=(0.024, 0.036), stiffness=(4e4, 3e5)),
     ],
     "hood_yield": [_one("hood_yield", "smooth", force=(2400.0, 3300.0), remaining=(0.1, 0.6))],
-    "rate_dependent_hood": [_one("rate_dependent_hood", "logarithmic", share=(0.004, 0.04))],
-    "sensor_saturation": [_one("sensor_saturation", "soft", limit=(250.0, 700.0))],
-}
+    "rate_dependent_hood": [
+        _one("rate_dependent_hood", "logarithmic", share=(0.004, 0.15)),
+        _one("rate_dependent_hood", "ramped", damping=(8.0, 130.0), ramp=(0.004, 0.008)),
+        _one("rate_dependent_hood", "fading", damping=(8.0, 130.0), end=(0.01, 0.03)),
+    ],
+    "hood_inertia": [
+        _one("hood_inertia", "local_spring", mass=(0.03, 0.8), spring=(2e6, 4e6),
+             damping_ratio=(0.2, 0.6)),
+        _one("hood_inertia", "linear", mass=(0.02, 0.5), depth=(0.006, 0.015)),
+    ],
+    "skin_compliance": [_one("skin_compliance", "hertz", compliance=(2e-8, 8e-7))],
+    "unloading_slope": [
+        _one("unloading_slope", "curved", curvature=(1.2, 2.5)),
+        _one("unloading_slope", "deep", "growth", growth=(0.15, 0.8)),
+    ],
+    "hood_force_scale": [_one("hood_force_scale", "ageing", loss=(0.02, 0.25))],
+    "sensor_gain": [_one("sensor_gain", "warming", "change", change=(0.01, 0.12))],
+    "sensor_offset": [_one("sensor_offset", "drifting", "offset", offset=(0.8, 8.0))],
+    "sensor_saturation": [
+        _one("sensor_saturation", "soft", limit=(180.0, 700.0)),
+        _one("sensor_saturation", "recovery", limit=(90.0, 150.0), depth=(0.05, 0.3),
+             time=(0.001, 0.005)),
+    ],
+    "sensor_filter": [
+        _one("sensor_filter", "bessel", channel_class=(100.0, 700.0)),
+        _one("sensor_filter", "steep", channel_class=(80.0, 500.0)),
+        _one("sensor_filter", "forward", channel_class=(80.0, 500.0)),
+    ],
+    "speed_bias": [
+        _one("speed_bias", "offset", "offset", offset=(0.08, 0.8)),
+        _one("speed_bias", "drifting", "change", change=(0.02, 0.12)),
+    ],
+}  # fmt: skip
 OUTSIDE: list[Draw] = [
-    _one("ageing", "", loss=(0.001, 0.008)),
-    _one("ringing", "", share=(0.01, 0.08), length=(0.008, 0.02)),
-    _one("cable", "", size=(0.4, 3.0)),
+    _one("ringing", "", share=(0.02, 0.12), length=(0.008, 0.02)),
+    _one("cable", "", size=(0.6, 4.0)),
+    _one("rupture", "", depth=(0.015, 0.03), share=(0.05, 0.3)),
+    _one("guide_friction", "", force=(40.0, 400.0)),
+    _one("mount_resonance", "", frequency=(500.0, 900.0), damping_ratio=(0.05, 0.15)),
 ]
-KINDS = ("none", "catalogue", "other form", "outside", "pair")
+KINDS = ("none", "own form", "foreign form", "outside", "pair")
 
 
 def draw(seed: int, kind: str) -> list[Hidden]:
@@ -79,6 +130,6 @@ def draw(seed: int, kind: str) -> list[Hidden]:
         return []
     if kind == "outside":
         return [OUTSIDE[rng.integers(len(OUTSIDE))](rng)]
-    table = OTHER_FORMS if kind == "other form" else CATALOGUE
+    table = FOREIGN if kind == "foreign form" else CATALOGUE
     names = rng.permutation(sorted(table))[: 2 if kind == "pair" else 1]
     return [table[name][rng.integers(len(table[name]))](rng) for name in names]

@@ -15,7 +15,7 @@ from mcstudy.studyfile.study_inputs import map_inputs
 from models.registry import load_model
 from studies.kinds import load_study
 from studies.monte_carlo.schema import MonteCarloStudy
-from studies.validation.diagnosis.hidden_effects import Hidden
+from studies.validation.diagnosis.laboratory import Hidden
 
 Array = NDArray[np.float64]
 

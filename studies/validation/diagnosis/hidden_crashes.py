@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from models.registry import load_model
 from studies.validation.diagnosis.hidden_accidents import alter
-from studies.validation.diagnosis.hidden_effects import Hidden
+from studies.validation.diagnosis.laboratory import Hidden
 
 Array = NDArray[np.float64]
 

@@ -22,9 +22,9 @@ from studies.validation.diagnosis.trial import Outcome, Trial, run_trial
 SHARES = {
     ("none", False): 4,
     ("none", True): 2,
-    ("catalogue", False): 5,
-    ("catalogue", True): 3,
-    ("other form", False): 2,
+    ("own form", False): 5,
+    ("own form", True): 3,
+    ("foreign form", False): 2,
     ("outside", False): 2,
     ("pair", True): 2,
 }
@@ -57,17 +57,17 @@ TARGETS = (
     Target("false_alarms", "false alarms without effect",
            lambda o: o.trial.kind == "none", lambda o: o.detected, 0.0, 0.05),
     Target("detection", "detection at twice the detectable size or more",
-           lambda o: o.trial.kind == "catalogue" and o.size >= LARGE,
+           lambda o: o.trial.kind == "own form" and o.size >= LARGE,
            lambda o: o.detected, 0.90, 1.0),
     Target("truth_in_set", "truth in the named set, given detection",
-           lambda o: o.trial.kind == "catalogue" and bool(o.named), _right, 0.95, 1.0),
+           lambda o: o.trial.kind == "own form" and bool(o.named), _right, 0.95, 1.0),
     Target("single_wrong", "one single wrong name",
-           lambda o: o.trial.kind == "catalogue",
+           lambda o: o.trial.kind == "own form",
            lambda o: len(o.named) == 1 and not _right(o), 0.0, 0.02),
     Target("outside_named", "outside the catalogue, given a catalogue name",
            lambda o: o.trial.kind == "outside", lambda o: bool(o.named), 0.0, 0.10),
     Target("other_form", "other functional form named rightly, given detection",
-           lambda o: o.trial.kind == "other form" and o.detected, _right, 0.80, 1.0),
+           lambda o: o.trial.kind == "foreign form" and o.detected, _right, 0.80, 1.0),
     Target("pair_both", "two effects: both named, given detection",
            lambda o: o.trial.kind == "pair" and o.detected,
            lambda o: all(name in o.named for name in o.names), 0.65, 1.0),
@@ -75,7 +75,7 @@ TARGETS = (
            lambda o: o.trial.kind == "pair",
            lambda o: bool(o.named) and not o.flagged and not _right(o), 0.0, 0.03),
     Target("spurious_second", "a spurious second effect when one is hidden",
-           lambda o: o.trial.kind in ("catalogue", "other form"),
+           lambda o: o.trial.kind in ("own form", "foreign form"),
            lambda o: o.second is not None, 0.0, 0.02),
 )  # fmt: skip
 
@@ -165,7 +165,7 @@ def _power(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
     """Return the share of effects of the catalogue that are detected, by size."""
     rows = []
     for low, high in itertools.pairwise(BINS):
-        part = [o for o in outcomes if o.trial.kind == "catalogue" and low <= o.size < high]
+        part = [o for o in outcomes if o.trial.kind == "own form" and low <= o.size < high]
         if part:
             rate = probability(np.array([o.detected for o in part]))
             middle = float(np.median([o.size for o in part]))

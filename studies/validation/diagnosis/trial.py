@@ -24,18 +24,32 @@ from studies.diagnosis.model_choice import choose_model
 from studies.diagnosis.problem import build_problem
 from studies.diagnosis.study import simulation_of
 from studies.validation.diagnosis.drawing import draw
-from studies.validation.diagnosis.hidden_effects import Hidden, Laboratory, make_tests
+from studies.validation.diagnosis.hidden_effects import make_tests
+from studies.validation.diagnosis.laboratory import Hidden, Laboratory, draw_laboratory
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A trial: seed, kind of set, and whether load cell and rebound speed were recorded."""
+    """A trial.
+
+    Attributes
+    ----------
+    seed : int
+        Of effect, laboratory and noise.
+    kind : str
+        Kind of set, one of ``drawing.KINDS``.
+    force : bool
+        Whether load cell and rebound speed were recorded.
+    usual : bool
+        Whether the laboratory is the usual one, else another one is drawn.
+    """
 
     seed: int
     kind: str
     force: bool
+    usual: bool = True
 
 
 @dataclass(frozen=True)
@@ -97,6 +111,8 @@ class Outcome:
 def run_trial(trial: Trial, workers: int = 1) -> Outcome:
     """Run a trial and return its outcome."""
     laboratory = Laboratory(force=trial.force, rebound=trial.force)
+    if not trial.usual:
+        laboratory = draw_laboratory(np.random.default_rng([trial.seed, 78]), force=trial.force)
     hidden = draw(trial.seed, trial.kind)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "tests"

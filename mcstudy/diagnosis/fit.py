@@ -86,16 +86,20 @@ class FitError(Exception):
 def shared_names(problem: Problem, forms: Sequence[Form]) -> list[str]:
     """Return the names of the shared values: unknowns, then ``<cause>.<parameter>``."""
     return [u.name for u in problem.unknowns] + [
-        f"{form.cause}.{p.name}" for form in forms for p in form.free
+        f"{form.cause}.{name}" for form in forms for name in form.latents
     ]
 
 
 @dataclass(frozen=True)
 class _Common:
-    """Values that all tests share: unknowns, and parameters of effects by cause."""
+    """Values that all tests share: unknowns, and parameters of effects by cause.
+
+    Forms with a trend come with their latents, as their parameters differ from test to test.
+    """
 
     unknowns: dict[str, float]
     effects: dict[str, dict[str, float]]
+    trending: tuple[tuple[Form, Array], ...]
 
 
 def _common(problem: Problem, forms: Sequence[Form], shared: Array) -> _Common:
@@ -105,16 +109,23 @@ def _common(problem: Problem, forms: Sequence[Form], shared: Array) -> _Common:
         for unknown, score in zip(problem.unknowns, shared[:count], strict=True)
     }
     effects = {}
+    trending = []
     for form in forms:
-        effects[form.cause] = form.values(shared[count : count + len(form.free)])
-        count += len(form.free)
-    return _Common(unknowns, effects)
+        scores = shared[count : count + form.size]
+        effects[form.cause] = form.values(scores)
+        if form.trend is not None:
+            trending.append((form, scores))
+        count += form.size
+    return _Common(unknowns, effects, tuple(trending))
 
 
 def _observe(problem: Problem, common: _Common, layout: Layout, own: Array) -> Observation | None:
     inputs = layout.inputs(own, problem.ranges)
     inputs.update(common.unknowns)
-    return problem.simulate(inputs, common.effects)
+    effects = common.effects
+    if common.trending:
+        effects = effects | {f.cause: f.values(z, layout.test) for f, z in common.trending}
+    return problem.simulate(inputs, effects)
 
 
 def observe_tests(
@@ -252,6 +263,18 @@ class Centre:
         if weight not in self._made:
             self._made[weight] = NormalEquations(self.own_slopes, self.slopes.shared, weight)
         return self._made[weight]
+
+    def of_tests(self, chosen: Sequence[int]) -> "Centre":
+        """Return the linearised model of some of its tests."""
+        return Centre(
+            Scores(self.scores.shared, tuple(self.scores.own[i] for i in chosen)),
+            tuple(self.residuals[i] for i in chosen),
+            Slopes(
+                tuple(self.slopes.doubtful[i] for i in chosen),
+                tuple(self.slopes.shared[i] for i in chosen),
+            ),
+            tuple(self.own_slopes[i] for i in chosen),
+        )
 
     @functools.cached_property
     def _made(self) -> dict[float, NormalEquations]:

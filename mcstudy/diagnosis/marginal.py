@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 FREEDOM = 5.0
 """Degrees of freedom of a test's repeatability in simulated data (assumed: outlying tests occur
 more often than under normal scatter)."""
+LEARNT = 0.2
+"""Share of a prior variance that the data must take away for its latent to be judged."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +32,14 @@ class Reduced:
     information : (m, m) Fisher information of the shapes.
     score : (d, m) score vectors of d data sets.
     log_likelihood : (d,) of the data without the shapes, up to a constant.
+    shared : (d, p) most probable latents of the shared values without the shapes, each in standard
+        deviations of what the priors expect of it; zero where the data say little.
     """
 
     information: Array
     score: Array
     log_likelihood: Array
+    shared: Array
 
 
 class Marginal:
@@ -126,10 +131,14 @@ class Marginal:
         cross, own = information[:p, p:], score[:, :p]
         quadratic += np.einsum("dk,kl,dl->d", own, inverse, own)
         log_determinant += float(np.linalg.slogdet(block)[1]) if p else 0.0
+        # The most probable latent has the prior's variance less that of the posterior.
+        known = 1.0 - np.diag(inverse)
+        expected = np.where(known > LEARNT, np.sqrt(np.maximum(known, LEARNT)), np.inf)
         return Reduced(
             information=information[p:, p:] - cross.T @ inverse @ cross,
             score=score[:, p:] - own @ inverse @ cross,
             log_likelihood=0.5 * (quadratic - log_determinant),
+            shared=(own @ inverse) / expected,
         )
 
     def _scales(self, scatter: Scatter) -> list[Array]:

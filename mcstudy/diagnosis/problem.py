@@ -113,6 +113,28 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Trend:
+    """A parameter that changes from test to test along a covariate.
+
+    Attributes
+    ----------
+    covariate : a covariate or a recorded input of the tests.
+    parameter : number of the parameter among the free ones.
+    centre, scale : mean and standard deviation of the covariate.
+    """
+
+    covariate: str
+    parameter: int
+    centre: float
+    scale: float
+
+    def place(self, test: Test) -> float:
+        """Return the covariate of a test in standard deviations from its mean."""
+        value = test.covariates.get(self.covariate, test.inputs.get(self.covariate, self.centre))
+        return (value - self.centre) / self.scale
+
+
+@dataclass(frozen=True)
 class Form:
     """A functional form of a cause.
 
@@ -122,22 +144,57 @@ class Form:
     name : of the form.
     fixed : values of parameters that the form fixes.
     free : parameters that are fitted.
+    trend : change of one of them along a covariate; the last latent is its size, in latents of the
+        parameter per standard deviation of the covariate.
+    named : whether the form is a formula of the field, not a table or a trend that stands for any.
     """
 
     cause: str
     name: str
     fixed: Mapping[str, float]
     free: tuple[Parameter, ...]
+    trend: Trend | None = None
+    named: bool = True
 
-    def values(self, scores: Sequence[float] | Array) -> dict[str, float]:
-        """Return the parameters by name at latents of the free ones."""
-        free = {p.name: value_at(p.prior, float(z)) for p, z in zip(self.free, scores, strict=True)}
+    @property
+    def size(self) -> int:
+        """Number of latents."""
+        return len(self.free) + (self.trend is not None)
+
+    @property
+    def latents(self) -> tuple[str, ...]:
+        """Names of the latents."""
+        names = tuple(parameter.name for parameter in self.free)
+        if self.trend is None:
+            return names
+        return (*names, f"{names[self.trend.parameter]} with {self.trend.covariate}")
+
+    def values(self, scores: Sequence[float] | Array, test: Test | None = None) -> dict[str, float]:
+        """Return the parameters by name at latents, of a test where they change along a trend."""
+        latents = [float(z) for z in scores]
+        if self.trend is not None:
+            change = latents.pop()
+            if test is not None:
+                latents[self.trend.parameter] += change * self.trend.place(test)
+        free = {p.name: value_at(p.prior, z) for p, z in zip(self.free, latents, strict=True)}
         return {**self.fixed, **free}
 
 
 @dataclass(frozen=True)
 class Cause:
-    """A named cause: its forms, its size parameter, its signature and confusable causes."""
+    """A named cause.
+
+    Attributes
+    ----------
+    name, title : of the cause.
+    forms : its functional forms.
+    size : parameter that sets its size.
+    signature : how it shows in the data.
+    confusable : causes with a similar signature.
+    separated_by : measurement that distinguishes them.
+    varies_with : covariates along which the size may change from test to test; see
+        ``mcstudy.diagnosis.trends``.
+    """
 
     name: str
     title: str
@@ -146,6 +203,7 @@ class Cause:
     signature: str
     confusable: tuple[str, ...]
     separated_by: str
+    varies_with: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,14 @@
 """Model adequacy: a p-value calibrated on data simulated from the model itself.
 
-Four statistics look for four kinds of misfit: the catalogue's causes (largest score over the bank
-of templates), drifts, a smooth discrepancy, and a fine one that all tests share. The smallest of
-their p-values is calibrated on the same simulated data; the repeatability is re-estimated on each
-data set.
+Five statistics look for five kinds of misfit: the catalogue's causes (largest score over the bank
+of templates), drifts, a smooth discrepancy, a fine one that all tests share, and shared unknowns
+that fit only far out in their priors. The smallest of their p-values is calibrated on the same
+simulated data; the repeatability is re-estimated on each data set.
 """
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +21,18 @@ from mcstudy.diagnosis.templates import Shapes, Template
 
 Array = NDArray[np.float64]
 
-LEVEL = 0.05
-"""Probability of a false alarm."""
+LEVEL = 0.04
+"""p-value below which a model is inadequate."""
+FLIP_LEVEL = 0.01
+"""The same of the sign flips, which need no covariance; both together make 5 % of false alarms."""
 DRAWS = 1000
 """Simulated data sets on which a p-value is calibrated."""
 USUAL, SPREAD = 0.01, 1.2
 """Median and log standard deviation of the repeatability's prior (assumed: 0.3 to 3 %)."""
 SMALLEST, LARGEST = 2e-4, 0.2
 """Bounds of the repeatability."""
+AT_BOUND = 0.98
+"""Share of the largest repeatability from which the bound counts as reached."""
 NEAR = np.array([0.4, 0.55, 0.75, 1.0, 1.35, 1.8, 2.5])
 """Factors on the repeatability that are tried on simulated data."""
 FREE = 10.0
@@ -74,6 +78,16 @@ class Screening:
     threshold: float
     flip_p_value: float
     drift: tuple[str, float]
+
+    @property
+    def contradictory(self) -> bool:
+        """Whether the sign flips alone call the model inadequate."""
+        return self.p_value > LEVEL and self.flip_p_value <= FLIP_LEVEL
+
+    @property
+    def alarm(self) -> bool:
+        """Whether the model is inadequate."""
+        return self.p_value <= LEVEL or self.contradictory
 
 
 def _errors(marginal: Marginal, information: Array) -> Array:
@@ -136,6 +150,11 @@ def estimate_scatter(fitted: Fit, layouts: Sequence[Layout], shapes: Shapes | No
     return _scatter_at(found.x)
 
 
+def is_at_bound(scatter: Scatter) -> bool:
+    """Return whether a repeatability has reached its upper bound."""
+    return max(scatter.level, scatter.shape) >= AT_BOUND * LARGEST
+
+
 def _scatter_at(logarithms: Array) -> Scatter:
     level, shape = np.exp(np.clip(logarithms, np.log(SMALLEST), np.log(LARGEST)))
     return Scatter(float(level), float(shape))
@@ -183,14 +202,15 @@ def screen(
     errors = _errors(marginal, measured.information)
     found = _statistics(measured, parts, errors)[0]
     null = _null(marginal, fitted.scatter, parts, rng)
-    own = [_upper_share(null[:, k], found[k : k + 1])[0] for k in range(4)]
-    ranks = np.stack([_upper_share(null[:, k], null[:, k]) for k in range(4)], axis=1)
+    count = found.size
+    own = [_upper_share(null[:, k], found[k : k + 1])[0] for k in range(count)]
+    ranks = np.stack([_upper_share(null[:, k], null[:, k]) for k in range(count)], axis=1)
     smallest = ranks.min(axis=1)
     p_value = float((1 + np.sum(smallest <= min(own))) / (smallest.size + 1))
     cut = float(np.quantile(smallest, LEVEL))
     threshold = float(np.quantile(null[:, 0], 1.0 - cut)) if bank else np.inf
     bank_part, drift_part = parts[:2]
-    names = ("cause", "drift", "smooth discrepancy", "fine discrepancy")
+    names = ("cause", "drift", "smooth discrepancy", "fine discrepancy", "priors of the unknowns")
     return Screening(
         p_value=p_value,
         statistics=tuple(
@@ -261,7 +281,7 @@ def _tables(
 
 
 def _statistics(reduced: Reduced, parts: Sequence[slice], errors: Array) -> Array:
-    """Return the four statistics (d, 4)."""
+    """Return the five statistics (d, 5)."""
     columns = []
     for part in parts[:2]:
         standard = np.abs(reduced.score[:, part] / errors[part])
@@ -270,17 +290,18 @@ def _statistics(reduced: Reduced, parts: Sequence[slice], errors: Array) -> Arra
         quadratic_form(reduced.information[part, part], reduced.score[:, part])[0]
         for part in parts[2:]
     ]
+    columns.append(np.abs(reduced.shared).max(axis=1, initial=0.0))
     return np.stack(columns, axis=1)
 
 
 def _null(
     marginal: Marginal, scatter: Scatter, parts: Sequence[slice], rng: np.random.Generator
 ) -> Array:
-    """Return the statistics (DRAWS, 4) of data simulated from the model."""
+    """Return the statistics (DRAWS, 5) of data simulated from the model."""
     products = marginal.draw(DRAWS, scatter, rng)
     smooth = parts[2]
     best = np.full(DRAWS, -np.inf)
-    statistics = np.zeros((DRAWS, len(parts)))
+    statistics = np.zeros((DRAWS, len(parts) + 1))
     for level, shape in itertools.product(NEAR, NEAR):
         tried = Scatter(scatter.level * level, scatter.shape * shape)
         reduced = marginal.reduce(products, tried)
@@ -291,7 +312,7 @@ def _null(
         better = likelihood > best
         best[better] = likelihood[better]
         errors = _errors(marginal, reduced.information)
-        part = Reduced(reduced.information, reduced.score[better], reduced.log_likelihood[better])
+        part = replace(reduced, score=reduced.score[better], shared=reduced.shared[better])
         if better.any():
             statistics[better] = _statistics(part, parts, errors)
     return statistics

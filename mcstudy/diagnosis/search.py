@@ -20,18 +20,28 @@ from mcstudy.diagnosis.model_selection import (
     settle,
 )
 from mcstudy.diagnosis.problem import Cause, Problem
-from mcstudy.diagnosis.screening import LEVEL, Screening, estimate_scatter, score_templates, screen
+from mcstudy.diagnosis.screening import (
+    Screening,
+    estimate_scatter,
+    is_at_bound,
+    score_templates,
+    screen,
+)
 from mcstudy.diagnosis.templates import (
     Template,
-    all_forms,
     cause_templates,
     drifts,
     fine_discrepancy,
+    named_forms,
     smooth_discrepancy,
 )
+from mcstudy.diagnosis.trends import add_trends
 from mcstudy.errors import UserError
 from mcstudy.studyfile.input_space import value_at
 
+WIDENING = 2.0
+"""Log units of evidence for each of misfit that remains within which causes are indistinguishable
+(calibrated on hidden sets of foreign forms)."""
 SECOND = 6.0
 """Log evidence that a second cause must add."""
 SINGLES, SECONDS = 30, 12
@@ -157,10 +167,11 @@ def search(
         If the model cannot simulate one of the tests.
     """
     rng = np.random.default_rng(seed)
+    causes = add_trends(causes, problem.tests)
     tell("fitting the base model")
     layouts, base = fit_base(problem)
     tell("testing its adequacy")
-    bank = tuple(cause_templates(problem, layouts, base, all_forms(causes)))
+    bank = tuple(cause_templates(problem, layouts, base, named_forms(causes)))
     screening = screen(
         base,
         layouts,
@@ -174,7 +185,7 @@ def search(
         layouts, base, bank, screening, (), None, None, (), None, (), None, False,
         "the model explains the data within its uncertainty",
     )  # fmt: skip
-    if screening.p_value > LEVEL:
+    if not screening.alarm and not is_at_bound(base.scatter):
         return empty
     tell("the model is inadequate: fitting the causes")
     settled = settle(problem, layouts, base)
@@ -193,9 +204,19 @@ def _judge(
     """Return the result for ranked candidates."""
     nothing = replace(empty, candidates=candidates, cause=UNEXPLAINED)
     if not candidates or candidates[0].log_evidence < DISTINCT:
+        if empty.screening.contradictory:
+            return replace(
+                empty, candidates=candidates,
+                why="the model explains the data within its uncertainty, although residuals have "
+                "the same sign in more tests than by chance: no cause gains from it",
+            )  # fmt: skip
         return replace(nothing, why="no cause of the catalogue explains the misfit")
     best = candidates[0]
     left = examine(problem, empty.layouts, empty.base, best.fitted)
+    if best.log_evidence < WIDENING * left.left:
+        return replace(
+            nothing, remainder=left, why="more of the misfit remains than the best cause explains"
+        )
     drift, evidence = empty.screening.drift
     if evidence > best.log_evidence + DISTINCT and left.p_value < STRUCTURE:
         return replace(nothing, remainder=left, why=f"a slow change explains more: {drift}")
@@ -203,7 +224,7 @@ def _judge(
         nothing,
         remainder=left,
         cause=best.cause.name,
-        ambiguous=_near(candidates),
+        ambiguous=_near(candidates, left.left),
         best=best.fitted,
         why="one cause explains the misfit",
     )
@@ -245,15 +266,20 @@ def _trace(
     problem: Problem, causes: Sequence[Cause], layouts: Sequence[Layout], fitted: Fit
 ) -> bool:
     """Return whether a template detects a further cause that the general test misses."""
-    bank = cause_templates(problem, layouts, fitted, all_forms(causes))
+    bank = cause_templates(problem, layouts, fitted, named_forms(causes))
     score, information = score_templates(fitted, layouts, bank)
     seen = information > 0.0
     return bool(np.any(np.abs(score[seen]) > FURTHER * np.sqrt(information[seen])))
 
 
-def _near(candidates: Sequence[Candidate]) -> tuple[str, ...]:
-    """Return the causes indistinguishable from the best one, with it; none if it is unique."""
-    limit = candidates[0].log_evidence - DISTINCT
+def _near(candidates: Sequence[Candidate], left: float = 0.0) -> tuple[str, ...]:
+    """Return the causes indistinguishable from the best one, with it; none if it is unique.
+
+    Where the best one leaves structure, so may the difference of two causes be due to their forms:
+    what a free discrepancy would still explain counts as the uncertainty of the evidence.
+    """
+    apart = max(DISTINCT, WIDENING * left)
+    limit = candidates[0].log_evidence - apart
     near = tuple(c.cause.name for c in candidates if c.log_evidence > limit)
     return near if len(near) > 1 else ()
 

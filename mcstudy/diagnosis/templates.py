@@ -29,7 +29,7 @@ ONE_PARAMETER = (-2.0, -1.0, -0.3, 0.3, 1.0, 2.0)
 MORE_PARAMETERS = (-2.0, -1.0, 0.0, 1.0, 2.0)
 FINE = tuple(np.linspace(-2.5, 2.5, 17))
 BESIDE_FINE = (-1.5, 0.0, 1.5)
-"""Latents of a cause's parameters at which it is tried."""
+"""Latents of a cause's parameters at which it is tried, the third one at the last."""
 STANDARD_GRID = 3
 """Number of free parameters on the grid; further ones stay at their median."""
 
@@ -60,7 +60,7 @@ class Shapes:
 
 def score_grid(form: Form, *, fine: bool = False) -> list[Array]:
     """Return the latents at which a form is tried; ``fine`` refines the first one's grid."""
-    count = len(form.free)
+    count = form.size
     if count == 0:
         return [np.zeros(0)]
     first: Sequence[float] = FINE if fine else MORE_PARAMETERS
@@ -68,6 +68,7 @@ def score_grid(form: Form, *, fine: bool = False) -> list[Array]:
         return [np.array([z]) for z in (FINE if fine else ONE_PARAMETER)]
     others: Sequence[float] = BESIDE_FINE if fine else MORE_PARAMETERS
     axes = [first] + [others] * (min(count, STANDARD_GRID) - 1)
+    axes = [*axes[:2], *(BESIDE_FINE for _ in axes[2:])]
     axes += [(0.0,)] * (count - STANDARD_GRID)
     return [np.array(z) for z in np.stack(np.meshgrid(*axes), -1).reshape(-1, count)]
 
@@ -238,6 +239,6 @@ def _stack(names: Sequence[str], columns: Sequence[Sequence[Array]], fitted: Fit
     return Shapes(tuple(names), tables)
 
 
-def all_forms(causes: Sequence[Cause]) -> list[Form]:
-    """Return the forms of all causes."""
-    return [form for cause in causes for form in cause.forms]
+def named_forms(causes: Sequence[Cause]) -> list[Form]:
+    """Return the named forms of all causes."""
+    return [form for cause in causes for form in cause.forms if form.named]

@@ -79,12 +79,17 @@ class ForceCurve:
         Unloading slope over secant slope at the largest penetration, > 1.
     damping : float
         Damping while loading, N s/m.
+    unloading_growth, unloading_curvature : float
+        Deviation from a straight unloading line of one ratio, which only the headform test against
+        one zone has; see ``models.headform.impact.Surface``.
     """
 
     penetration: Array
     force: Array
     unloading_ratio: float
     damping: float = 0.0
+    unloading_growth: float = 0.0
+    unloading_curvature: float = 1.0
 
     def __post_init__(self) -> None:
         d, f = self.penetration, self.force

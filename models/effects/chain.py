@@ -1,7 +1,7 @@
 """The effects that a model has switched on, in catalogue order."""
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -40,20 +40,29 @@ class EffectChain:
             All inputs by name.
         """
         for effect, names in self._stages.get(stage, ()):
-            subject = effect.apply(subject, {name: values[key] for name, key in names})
+            subject = effect.apply(
+                subject, {name: values.get(key, usual) for name, key, usual in names}
+            )
         return subject
 
     @functools.cached_property
-    def _stages(self) -> dict[str, list[tuple[Effect, list[tuple[str, str]]]]]:
-        """Effects by stage, each with its parameters and their names among the inputs."""
-        stages: dict[str, list[tuple[Effect, list[tuple[str, str]]]]] = {}
+    def _stages(self) -> dict[str, list[tuple[Effect, list[tuple[str, str, float]]]]]:
+        """Effects by stage, each with its parameters, their names as inputs and usual values."""
+        stages: dict[str, list[tuple[Effect, list[tuple[str, str, float]]]]] = {}
         for effect in self.effects:
-            names = [(name, effect.input_name(name)) for name in effect.parameters]
+            names = [
+                (name, effect.input_name(name), parameter.input.nominal)
+                for name, parameter in effect.parameters.items()
+            ]
             stages.setdefault(effect.stage, []).append((effect, names))
         return stages
 
 
-def build_chain(model: str, chosen: Mapping[str, Mapping[str, float]] | None) -> EffectChain:
+def build_chain(
+    model: str,
+    chosen: Mapping[str, Mapping[str, float]] | None,
+    without: Collection[str] = (),
+) -> EffectChain:
     """Return the chain of the effects that are switched on.
 
     Parameters
@@ -61,7 +70,9 @@ def build_chain(model: str, chosen: Mapping[str, Mapping[str, float]] | None) ->
     model : str
         Name of the model.
     chosen : mapping, optional
-        Parameter values by effect; those left out take the prior's median.
+        Parameter values by effect; those left out take their default, or the prior's median.
+    without : collection of str
+        Names ``<effect>_<parameter>`` of parameters that this variant of the model does not have.
 
     Raises
     ------
@@ -81,13 +92,18 @@ def build_chain(model: str, chosen: Mapping[str, Mapping[str, float]] | None) ->
                 f"{', '.join(effect.models)}"
             )
         given = chosen[effect.name]
+        parameters = {
+            name: parameter
+            for name, parameter in effect.parameters.items()
+            if model in parameter.models and effect.input_name(name) not in without
+        }
         for name in given:
-            if name not in effect.parameters:
-                known = ", ".join(effect.parameters)
+            if name not in parameters:
+                known = ", ".join(parameters)
                 raise ValueError(f"effect {effect.name!r} has no parameter {name!r}, only {known}")
-        for name, parameter in effect.parameters.items():
+        for name, parameter in parameters.items():
             item = parameter.input
-            nominal = float(given.get(name, parameter.prior.quantile(0.5)))
+            nominal = float(given.get(name, item.nominal))
             if not item.low <= nominal <= item.high:
                 raise ValueError(
                     f"effects.{effect.name}.{name}: {nominal:g} {item.unit} is outside "

@@ -72,15 +72,18 @@ class Parameter:
     Attributes
     ----------
     input : Input
-        The parameter as an input of a model.
+        The parameter as an input of a model; its nominal value is taken where it is left out.
     prior : Prior
     none : float
         Null value, at which the effect vanishes.
+    models : tuple of str
+        Models that have the parameter; the others run at its nominal value.
     """
 
     input: Input
     prior: Prior
     none: float
+    models: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -101,6 +104,9 @@ class Effect:
         Parameter that sets the size of the effect.
     forms : mapping
         Functional forms by name; each fixes the values of some parameters.
+    varies_with : tuple of str
+        Covariates along which the size may change from test to test: recorded inputs, or ``order``
+        for every column of the tests that is no input.
     signature : str
         How the effect shows in the data.
     confusable : tuple of str
@@ -120,6 +126,7 @@ class Effect:
     parameters: Mapping[str, Parameter]
     size: str
     forms: Mapping[str, Mapping[str, float]]
+    varies_with: tuple[str, ...]
     signature: str
     confusable: tuple[str, ...]
     separated_by: str

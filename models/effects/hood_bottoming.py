@@ -1,7 +1,8 @@
 """Hood bottoming: the hood meets a structure below it after a clearance.
 
 Beyond the clearance the force grows by ``stiffness * depth * (depth / 10 mm)^(power - 1)``,
-approximated by straight segments.
+approximated by straight segments. In the free form the slopes of three segments have factors of
+their own.
 """
 
 from collections.abc import Mapping
@@ -15,6 +16,9 @@ REFERENCE = 0.010
 """Depth (m) beyond the clearance at which all powers have the same force."""
 DEPTHS = (0.002, 0.004, 0.007, 0.01, 0.014, 0.02, 0.04)
 """Depths (m) beyond the clearance of the knots of a curved law."""
+SEGMENTS = (0.003, 0.008, 0.04)
+"""Depths (m) beyond the clearance at which the segments of the free form end."""
+SLOPES = ("to_3_mm", "to_8_mm", "beyond_8_mm")
 
 NEAREST = 1e-6
 """m from a knot of the curve within which none is added."""
@@ -25,10 +29,17 @@ def apply(curve: ForceCurve, parameters: Mapping[str, float]) -> ForceCurve:
     clearance, power = parameters["clearance"], parameters["power"]
     if parameters["stiffness"] == 0.0:
         return curve
-    depths = np.array([0.0, *(DEPTHS if power > 1.0 else DEPTHS[-1:])])
+    slopes = [parameters[name] for name in SLOPES]
+    free = any(slope != 1.0 for slope in slopes)
+    depths = np.array([0.0, *(SEGMENTS if free else DEPTHS if power > 1.0 else DEPTHS[-1:])])
     added_knots = clearance + depths
     apart = np.abs(added_knots[:, None] - curve.penetration).min(axis=1) > NEAREST
     x = np.sort(np.concatenate([curve.penetration, added_knots[apart]]))
     depth = np.maximum(x - clearance, 0.0)
-    added = parameters["stiffness"] * depth * (depth / REFERENCE) ** (power - 1.0)
-    return replace(curve, penetration=x, force=curve.at(x) + added)
+    if free:
+        rise = np.cumsum(np.array(slopes) * np.diff(depths))
+        beyond = np.maximum(depth - SEGMENTS[-1], 0.0)
+        added = np.interp(depth, depths, np.append(0.0, rise)) + slopes[-1] * beyond
+    else:
+        added = depth * (depth / REFERENCE) ** (power - 1.0)
+    return replace(curve, penetration=x, force=curve.at(x) + parameters["stiffness"] * added)

@@ -55,14 +55,21 @@ def load_effect(name: str) -> Effect:
         raise ValueError(f"effect {name!r}: unknown stage {row['stage']!r}")
     if row["size"] not in row["parameters"]:
         raise ValueError(f"effect {name!r}: its size {row['size']!r} is no parameter of it")
+    models = tuple(row["models"])
     return Effect(
         name=name,
         title=row["title"],
         stage=row["stage"],
-        models=tuple(row["models"]),
-        parameters={key: _parameter(key, entry) for key, entry in row["parameters"].items()},
+        models=models,
+        parameters={
+            key: _parameter(key, entry, models) for key, entry in row["parameters"].items()
+        },
         size=row["size"],
-        forms={form: dict(fixed) for form, fixed in row.get("forms", {name: {}}).items()},
+        forms={
+            form: _fixed(entry, row["parameters"])
+            for form, entry in row.get("forms", {name: {}}).items()
+        },
+        varies_with=tuple(row.get("varies_with", ())),
         signature=row["signature"],
         confusable=tuple(row["confusable"]),
         separated_by=row["separated_by"],
@@ -76,16 +83,27 @@ def effects_of(model: str) -> tuple[str, ...]:
     return tuple(name for name in EFFECTS if model in load_effect(name).models)
 
 
-def _parameter(name: str, row: dict[str, Any]) -> Parameter:
+def _fixed(form: dict[str, Any], parameters: dict[str, Any]) -> dict[str, float]:
+    """Return the values of the parameters that a form fixes, defaults included."""
+    free = form.get("free", ())
+    defaults = {
+        name: float(row["default"])
+        for name, row in parameters.items()
+        if "default" in row and name not in free
+    }
+    return defaults | {name: float(value) for name, value in form.items() if name != "free"}
+
+
+def _parameter(name: str, row: dict[str, Any], models: tuple[str, ...]) -> Parameter:
     prior = Prior(row["prior"][0], float(row["prior"][1]), float(row["prior"][2]))
     low, high = (float(v) for v in row["range"])
     item = Input(
         name=name,
         unit=row["unit"],
         meaning=row["meaning"],
-        nominal=float(prior.quantile(0.5)),
+        nominal=float(row.get("default", prior.quantile(0.5))),
         low=low,
         high=high,
         source="prior of the effect",
     )
-    return Parameter(item, prior, float(row["none"]))
+    return Parameter(item, prior, float(row["none"]), tuple(row.get("models", models)))

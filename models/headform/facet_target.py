@@ -96,6 +96,7 @@ class FacetTarget:
         for name in effects_of("headform")
         if load_effect(name).stage != "contact" or name == "skin_compliance"
     )
+    without: tuple[str, ...] = ("unloading_slope_growth", "unloading_slope_curvature")
 
     def __init__(
         self,
@@ -190,7 +191,7 @@ class FacetTarget:
         curves = self._curves(values, chain)
         contact = chain.act("contact", HeadformContact(values["friction_body_car"], 0.0, 0.0),
                             values)  # fmt: skip
-        skin = skin_of(self._skin, contact.skin_compliance, max(float(c.force[-1]) for c in curves))
+        skin = skin_of(self._skin, contact, max(float(c.force[-1]) for c in curves))
         ellipsoids = sphere(impactor.radius, curves, skin)
         stiffest = max(stiffest_slope(c.penetration, c.force, c.unloading_ratio) for c in curves)
         stride = steps_per_sample(stiffest, max(c.damping for c in curves), impactor.mass)

@@ -77,6 +77,7 @@ class FemTarget:
         for name in effects_of("headform")
         if load_effect(name).stage not in ("contact", "curve")
     )
+    without: tuple[str, ...] = ()
 
     def __init__(self, nominal: Mapping[str, float], vehicle: str | None, size: float) -> None:
         self.car = load_car(vehicle or "family_car_1990s")

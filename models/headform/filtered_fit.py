@@ -27,7 +27,7 @@ from models.headform.impact import (
     SAMPLES,
     SUMMARY,
     Impactor,
-    Surface,
+    plain_surface,
     strike,
 )
 from models.headform.target import SAMPLING_RATE
@@ -220,7 +220,7 @@ def _simulate(signal: _Signal, parameters: Array) -> tuple[Array, Array, float] 
     count = law_of(_curve_of(parameters), laws[0])
     record, summary = np.empty((round(LONGEST * SAMPLING_RATE), COLUMNS)), np.zeros(SUMMARY)
     strike(
-        Impactor(signal.mass, 1.0, 1.0), Surface(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.01),
+        Impactor(signal.mass, 1.0, 1.0), plain_surface(),
         laws, count, signal.speed, 0.0, 1.0 / (SAMPLING_RATE * STRIDE), STRIDE, record, summary,
     )  # fmt: skip
     if math.isnan(summary[END_TIME]):

@@ -146,7 +146,7 @@ class HeadformModel:
         for name in effects or ():
             if name in effects_of(self.name) and name not in self.effects:
                 raise ValueError(f"effect {name!r} does not apply to surface {surface!r}")
-        self._chain = build_chain(self.name, effects)
+        self._chain = build_chain(self.name, effects, self.target.without)
         self._inputs = self.target.inputs + self._chain.inputs
 
     @property

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models import data
+from models.contact.headform import HeadformContact
 from models.contact.law import ForceCurve, combine_curves, law_of
 from models.effects.chain import EffectChain
 from models.headform.impact import Impactor
@@ -68,6 +69,8 @@ class Target(Protocol):
         Inputs of the test, those of the headform included.
     effects : tuple of str
         Effects that apply to it.
+    without : tuple of str
+        Names ``<effect>_<parameter>`` of their parameters that it does not have.
     digest : str
         Identifies a user's own file; part of the model's version.
     """
@@ -79,6 +82,10 @@ class Target(Protocol):
     @property
     def effects(self) -> tuple[str, ...]:
         """Effects that apply."""
+
+    @property
+    def without(self) -> tuple[str, ...]:
+        """Parameters of effects that it does not have."""
 
     @property
     def digest(self) -> str:
@@ -152,23 +159,38 @@ def vinyl_skin() -> ForceCurve:
     return ForceCurve(knots[:, 0].copy(), knots[:, 1].copy(), row["unloading_ratio"])
 
 
-def skin_of(skin: ForceCurve | None, compliance: float, force: float) -> ForceCurve | None:
-    """Return a headform's skin in series with a linear elastic spring.
+SKIN_KNOTS = (0.02, 0.06, 0.12, 0.22, 0.36, 0.55, 0.8, 1.1, 1.5, 2.0)
+"""Forces of the knots of a curved skin, over the reference force."""
+SKIN_REFERENCE = 4000.0
+"""N at which the compliance of a skin is given (a usual peak of a headform test)."""
+
+
+def skin_of(
+    skin: ForceCurve | None, contact: HeadformContact, force: float
+) -> ForceCurve | None:
+    """Return a headform's skin in series with an elastic spring.
 
     Parameters
     ----------
     skin : ForceCurve, optional
         By default the headform is rigid.
-    compliance : float
-        m/N; 0 for none.
+    contact : HeadformContact
+        With compliance and exponent of the spring.
     force : float
-        Force up to which a spring alone has a knot, N.
+        Force up to which a linear spring alone has a knot, N.
     """
-    if compliance == 0.0:
+    if contact.skin_compliance == 0.0:
         return skin
+    forces = np.array([0.0, force])
+    if skin is not None:
+        forces = skin.force
+    elif contact.skin_power != 1.0:
+        forces = SKIN_REFERENCE * np.array([0.0, *SKIN_KNOTS])
+    given = contact.skin_compliance * SKIN_REFERENCE
+    spring = given * (forces / SKIN_REFERENCE) ** contact.skin_power
     if skin is None:
-        return ForceCurve(np.array([0.0, compliance * force]), np.array([0.0, force]), ELASTIC)
-    return ForceCurve(skin.penetration + compliance * skin.force, skin.force, skin.unloading_ratio)
+        return ForceCurve(spring, forces, ELASTIC)
+    return ForceCurve(skin.penetration + spring, forces, skin.unloading_ratio)
 
 
 def write_law(curve: ForceCurve, skin: ForceCurve | None, law: Array) -> int:

@@ -30,8 +30,10 @@ from models.headform.impact import (
     SUMMARY,
     TANGENTIAL,
     Impactor,
+    Part,
     Surface,
     strike,
+    strike_part,
 )
 from models.headform.target import (
     LONGEST_CONTACT,
@@ -45,6 +47,10 @@ from models.protocol import Input
 from models.vehicle.profile import load_vehicle
 
 Array = NDArray[np.float64]
+
+
+LEFT = 0.005
+"""s without contact after which a headform has left a part of the hood that moves on its own."""
 
 
 class ZoneTarget:
@@ -66,6 +72,7 @@ class ZoneTarget:
     """
 
     effects: tuple[str, ...] = effects_of("headform")
+    without: tuple[str, ...] = ()
 
     def __init__(
         self,
@@ -144,7 +151,7 @@ class ZoneTarget:
             values,
         )
         laws = np.zeros((1, KNOTS, 4))
-        skin = skin_of(self._skin, contact.skin_compliance, float(curve.force[-1]))
+        skin = skin_of(self._skin, contact, float(curve.force[-1]))
         count = write_law(curve, skin, laws[0])
         stiffest = stiffest_slope(curve.penetration, curve.force, curve.unloading_ratio)
         stride = steps_per_sample(stiffest, contact.damping, impactor.mass)
@@ -152,12 +159,24 @@ class ZoneTarget:
         speeds = (speed * math.cos(angle), speed * math.sin(angle))
         record = np.empty((round(LONGEST_CONTACT * SAMPLING_RATE), COLUMNS))
         summary = np.zeros(SUMMARY)
-        strike(
-            impactor,
-            Surface(contact.friction, contact.damping, contact.onset, contact.rate_share,
-                    contact.rate_exponent, contact.moved_mass, contact.moved_depth),
-            laws, count, *speeds, 1.0 / (SAMPLING_RATE * stride), stride, record, summary,
+        surface = Surface(
+            contact.friction, contact.damping, contact.onset, contact.rate_share,
+            contact.rate_exponent, contact.rate_force, contact.pickup,
+            curve.unloading_growth, curve.unloading_curvature,
         )  # fmt: skip
+        if contact.part_mass > 0.0:
+            part = Part(contact.part_mass, contact.part_stiffness, contact.part_damping)
+            # Its damping tapers in, so that the frequency alone decides.
+            stride = max(stride, steps_per_sample(part.stiffness, 0.0, part.mass))
+            strike_part(
+                impactor, surface, part, laws, count, *speeds,
+                1.0 / (SAMPLING_RATE * stride), stride, LEFT, record, summary,
+            )  # fmt: skip
+        else:
+            strike(
+                impactor, surface, laws, count, *speeds,
+                1.0 / (SAMPLING_RATE * stride), stride, record, summary,
+            )  # fmt: skip
         kept = record[: int(summary[SAMPLES])].copy()
         hood = float(interpolate_law(laws, 0, count, SURFACE, summary[DEEPEST]))
         return Strike(

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,15 +10,30 @@ from numpy.typing import NDArray
 from mcstudy.diagnosis.problem import Cause, Form, Parameter
 from mcstudy.studyfile.input_space import InputSpace
 from models.effects.effect import Effect, Prior
-from models.effects.registry import effects_of, load_effect
+from models.effects.registry import load_effect
 from models.protocol import Input
+from models.registry import load_model
 
 Array = NDArray[np.float64]
 
+FREE_FORM = "free_form"
+"""Name of the forms that are tables over a cause's own coordinate."""
 
-def causes_of(model: str) -> tuple[Cause, ...]:
-    """Return the causes that apply to a model."""
-    return tuple(_cause(load_effect(name)) for name in effects_of(model))
+
+def causes_of(name: str, options: Mapping[str, Any] | None = None) -> tuple[Cause, ...]:
+    """Return the causes that apply to a model.
+
+    Parameters
+    ----------
+    name : str
+        Name of the model.
+    options : mapping, optional
+        Its options.
+    """
+    model = load_model(name, options or {})
+    everything = load_model(name, options or {}, {effect: {} for effect in model.effects})
+    inputs = frozenset(item.name for item in everything.inputs)
+    return tuple(_cause(load_effect(effect), inputs) for effect in model.effects)
 
 
 def stage_of(cause: str) -> str:
@@ -25,21 +41,27 @@ def stage_of(cause: str) -> str:
     return load_effect(cause).stage
 
 
-def _cause(effect: Effect) -> Cause:
+def _cause(effect: Effect, inputs: frozenset[str]) -> Cause:
+    """Return an effect as a cause of a model with all its effects' parameters among the inputs."""
+    held = [name for name in effect.parameters if effect.input_name(name) in inputs]
     forms = tuple(
         Form(
             cause=effect.name,
             name=form,
-            fixed=dict(fixed),
-            free=tuple(_parameter(effect, name) for name in effect.parameters if name not in fixed),
+            fixed={name: value for name, value in fixed.items() if name in held},
+            free=tuple(_parameter(effect, name) for name in held if name not in fixed),
+            named=form != FREE_FORM,
         )
         for form, fixed in effect.forms.items()
+        # A form takes all the parameters that it leaves free.
+        if all(name in held for name in effect.parameters if name not in fixed)
     )
     return Cause(
         name=effect.name,
         title=effect.title,
         forms=forms,
         size=effect.size,
+        varies_with=effect.varies_with,
         signature=effect.signature,
         confusable=effect.confusable,
         separated_by=effect.separated_by,

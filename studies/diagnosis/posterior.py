@@ -15,16 +15,25 @@ def describe(problem: Problem, fitted: Fit) -> dict[str, list[dict[str, Any]]]:
     """Return by cause the parameters of a fit as plain data, with 95 % intervals.
 
     A parameter that the form fixes has a value only, and ``fixed`` is true.
+
+    Parameters
+    ----------
+    problem : Problem
+    fitted : Fit
     """
     found: dict[str, list[dict[str, Any]]] = {}
     k = len(problem.unknowns)
     for form in fitted.forms:
+        latents = fitted.scores.shared[k : k + form.size]
+        errors = np.sqrt(np.diag(fitted.covariance)[k : k + form.size])
+        if form.trend is not None:
+            # Of a single test, the change along the covariate counts as spread.
+            errors[form.trend.parameter] = np.hypot(errors[form.trend.parameter], latents[-1])
         rows: list[dict[str, Any]] = []
-        for parameter in form.free:
-            centre = float(fitted.scores.shared[k])
-            reach = REACH * float(np.sqrt(fitted.covariance[k, k]))
+        for parameter, centre, error in zip(form.free, latents, errors, strict=False):
             value, *ends = (
-                value_at(parameter.prior, z) for z in (centre, centre - reach, centre + reach)
+                value_at(parameter.prior, float(centre + side * REACH * error))
+                for side in (0.0, -1.0, 1.0)
             )
             rows.append(
                 {
@@ -36,10 +45,40 @@ def describe(problem: Problem, fitted: Fit) -> dict[str, list[dict[str, Any]]]:
                     **asdict(Estimate(value, min(ends), max(ends))),
                 }
             )
-            k += 1
         rows += [
             {"name": name, "unit": "1", "fixed": True, **asdict(Estimate(value, value, value))}
             for name, value in form.fixed.items()
         ]
         found[form.cause] = rows
+        k += form.size
+    return found
+
+
+def describe_trends(problem: Problem, fitted: Fit) -> dict[str, dict[str, Any]]:
+    """Return by cause how a parameter of a fit changes along a covariate, as plain data.
+
+    Parameters
+    ----------
+    problem : Problem
+    fitted : Fit
+        Whose forms may have a trend.
+    """
+    found = {}
+    k = len(problem.unknowns)
+    for form in fitted.forms:
+        if form.trend is not None:
+            scores = fitted.scores.shared[k : k + form.size]
+            parameter = form.free[form.trend.parameter]
+            ends = [
+                form.values(scores, chosen(problem.tests, key=form.trend.place))[parameter.name]
+                for chosen in (min, max)
+            ]
+            found[form.cause] = {
+                "covariate": form.trend.covariate,
+                "parameter": parameter.name,
+                "unit": parameter.unit,
+                "first": ends[0],
+                "last": ends[1],
+            }
+        k += form.size
     return found

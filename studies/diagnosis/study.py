@@ -26,7 +26,7 @@ from studies.diagnosis.causes import causes_of, stage_of
 from studies.diagnosis.emulator import Emulator
 from studies.diagnosis.extras import extras_of
 from studies.diagnosis.model_choice import ModelChoice, choose_model
-from studies.diagnosis.posterior import describe
+from studies.diagnosis.posterior import describe, describe_trends
 from studies.diagnosis.problem import build_problem
 from studies.diagnosis.report import draw, sections_of, subtitle_of
 from studies.diagnosis.simulation import Simulation
@@ -87,7 +87,7 @@ def diagnose(
     choice = choose_model(data, model_config)
     simulation = simulation_of(data, choice)
     problem = build_problem(data, choice, simulation)
-    causes = tuple(c for c in causes_of(choice.name) if c.name not in choice.effects)
+    causes = tuple(c for c in causes_of(choice.name, choice.options) if c.name not in choice.effects)
     say(f"{len(problem.tests)} tests, {len(causes)} causes", quiet=quiet)
     source_of_extras: Simulation | Emulator = simulation
     if is_collection(data):
@@ -160,6 +160,7 @@ def _write(
         },
         "cause": finding.cause,
         "ambiguous": list(finding.ambiguous),
+        "trends": {} if finding.best is None else describe_trends(problem, finding.best),
         "second_cause": None if finding.second is None else finding.second.cause.name,
         "second_ambiguous": list(finding.second_ambiguous),
         "flagged": finding.flagged,

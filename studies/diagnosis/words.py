@@ -104,6 +104,7 @@ def answer(found: Mapping[str, Any]) -> list[str]:
         return lines
     parameters = found["parameters"]
     lines += [sentence(cause, rows, titles[cause]) for cause, rows in parameters.items()]
+    lines += [trend_words(row) for row in found["trends"].values()]
     if found["ambiguous"]:
         others = [titles[name] for name in found["ambiguous"] if name != found["cause"]]
         lines.append(
@@ -116,6 +117,18 @@ def answer(found: Mapping[str, Any]) -> list[str]:
     if found["flagged"]:
         lines.append("A misfit remains that these causes do not explain.")
     return lines
+
+
+def trend_words(row: Mapping[str, Any]) -> str:
+    """Return a sentence on a parameter that changes along a covariate."""
+    name, factor = _shown_unit(row["unit"], max(abs(row["first"]), abs(row["last"])))
+    first, last = (number(factor * row[key]) for key in ("first", "last"))
+    along = "the order of the tests" if row["covariate"] == "order" else words(row["covariate"])
+    return (
+        f"It is not the same in all tests: {words(row['parameter'])} goes from {first} to {last} "
+        f"{unit(name)}".strip()
+        + f" along {along}."
+    )
 
 
 def _drift(name: str) -> str:

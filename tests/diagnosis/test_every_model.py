@@ -9,7 +9,7 @@ import pytest
 from mcstudy.diagnosis.problem import Cause
 from mcstudy.diagnosis.screening import score_templates
 from mcstudy.diagnosis.search import fit_base, search
-from mcstudy.diagnosis.templates import all_forms, cause_templates
+from mcstudy.diagnosis.templates import named_forms, cause_templates
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.measurement.isomme import write_test
 from mcstudy.measurement.measured_data import load_measured
@@ -95,7 +95,7 @@ def test_full_scale_tests_of_the_crash_core_show_a_clipped_signal(tmp_path: Path
     assert [scalar.name for scalar in problem.tests[0].scalars] == ["throw_distance", "wad"]
     layouts, base = fit_base(problem)
     causes = chosen("sensor_saturation", "sensor_offset", "wet_road")
-    bank = cause_templates(problem, layouts, base, all_forms(causes))
+    bank = cause_templates(problem, layouts, base, named_forms(causes))
     score, information = score_templates(base, layouts, bank)
     standard = np.abs(score) / np.sqrt(np.where(information > 0.0, information, np.inf))
     best = bank[int(np.argmax(standard))]

@@ -45,6 +45,14 @@ def test_generator_and_model_agree_where_nothing_is_hidden(tmp_path: Path) -> No
          {"clearance": 0.03, "stiffness": 2e5, "power": 1.0}),
         ("hood_yield", "catalogue", {"force": 2800.0, "remaining": 0.2},
          {"force": 2800.0, "remaining": 0.2}),
+        ("hood_inertia", "catalogue", {"mass": 0.4, "depth": 0.01}, {"mass": 0.4, "depth": 0.01}),
+        ("hood_inertia", "local_spring", {"mass": 0.2, "spring": 1e6, "loss": 0.0},
+         {"mass": 0.2, "stiffness": 1e6, "damping_ratio": 0.0}),
+        ("skin_compliance", "catalogue", {"compliance": 1e-6}, {"compliance": 1e-6, "power": 1.0}),
+        ("skin_compliance", "hertz", {"compliance": 1e-6},
+         {"compliance": 1e-6, "power": 2.0 / 3.0}),
+        ("unloading_slope", "curved", {"curvature": 1.8}, {"factor": 1.0, "curvature": 1.8}),
+        ("unloading_slope", "deep", {"growth": 0.6}, {"factor": 1.0, "growth": 0.6}),
     ],
 )  # fmt: skip
 def test_generator_and_model_agree_on_effects(

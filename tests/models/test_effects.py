@@ -136,14 +136,44 @@ def test_bottoming_begins_at_its_clearance_and_adds_its_stiffness() -> None:
 def test_powers_of_bottoming_meet_at_ten_millimetres() -> None:
     effect, model = load_effect("hood_bottoming"), load_model("headform", {"hood_curve": CURVE})
     curve = model.hood_curve({item.name: item.nominal for item in model.inputs})  # type: ignore[attr-defined]
+    usual = {name: entry.input.nominal for name, entry in effect.parameters.items()}
     linear, square = (
-        effect.apply(curve, {"clearance": 0.03, "stiffness": 3e5, "power": power})
+        effect.apply(curve, usual | {"clearance": 0.03, "stiffness": 3e5, "power": power})
         for power in (1.0, 2.0)
     )
     at = np.array([0.04])
     for found in (linear, square):
         np.testing.assert_allclose(found.at(at), curve.at(at) + 3000.0, rtol=1e-9)
     assert square.at(np.array([0.06]))[0] > linear.at(np.array([0.06]))[0]
+
+
+def test_a_free_form_whose_weights_are_equal_is_the_named_form() -> None:
+    weights = {f"at_{depth}_mm": 1.0 for depth in (2, 5, 10, 20, 40)}
+    dashpot = struck({"rate_dependent_hood": {"damping": 60.0, "share": 0.0}})
+    free = struck({
+        "rate_dependent_hood": {"damping": 0.0, "share": 0.0, "exponent": 1.0, "force": 480.0}
+        | weights
+    })  # fmt: skip
+    for channel, values in dashpot.histories["head"].channels.items():
+        np.testing.assert_allclose(free.histories["head"].channels[channel], values, rtol=1e-6)
+    linear = {"clearance": 0.03, "stiffness": 3e5, "power": 1.0}
+    slopes = {"to_3_mm": 1.0 + 1e-12, "to_8_mm": 1.0, "beyond_8_mm": 1.0}
+    named = struck({"hood_bottoming": linear})
+    assert struck({"hood_bottoming": linear | slopes}).outputs == pytest.approx(
+        named.outputs, rel=1e-6, nan_ok=True
+    )
+
+
+def test_what_is_left_out_of_an_effect_does_not_act() -> None:
+    # Parameters of other forms take their defaults, not their prior medians.
+    inertia = load_effect("hood_inertia")
+    for name in ("stiffness", "damping_ratio", "at_2_mm"):
+        assert inertia.parameters[name].input.nominal == 0.0
+    for model, has in (("headform", True), ("multibody", False)):
+        names = {i.name for i in load_model(model, {}, {"unloading_slope": {}}).inputs}
+        assert ("unloading_slope_curvature" in names) is has
+    with pytest.raises(ValueError, match="has no parameter 'growth', only factor"):
+        load_model("headform", {"surface": "facet"}, {"unloading_slope": {"growth": 0.1}})
 
 
 @pytest.mark.parametrize("clearance", [0.015, 0.035, 0.035 + 1e-9, 0.1])

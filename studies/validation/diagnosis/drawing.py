@@ -87,7 +87,7 @@ FOREIGN: dict[str, list[Draw]] = {
     ],
     "hood_inertia": [
         _one("hood_inertia", "local_spring", mass=(0.03, 0.8), spring=(2e6, 4e6),
-             damping_ratio=(0.2, 0.6)),
+             loss=(0.05, 0.2)),
         _one("hood_inertia", "linear", mass=(0.02, 0.5), depth=(0.006, 0.015)),
     ],
     "skin_compliance": [_one("skin_compliance", "hertz", compliance=(2e-8, 8e-7))],

@@ -183,11 +183,15 @@ class _Unloading:
     ratio: float
     growth: float = 0.0
     curvature: float = 1.0
+    skin: Hidden | None = None
 
     def slope(self, top: float, deepest: float) -> float:
         """Return the mean slope (N/m) from a largest penetration (m) with a force (N)."""
-        ratio = 1.0 + (self.ratio - 1.0) * (deepest / 0.03) ** self.growth
-        return ratio * top / deepest
+        skin = 0.0 if self.skin is None else float(_skin(np.array(top), self.skin))
+        hood = deepest - skin
+        ratio = 1.0 + (self.ratio - 1.0) * (hood / 0.03) ** self.growth
+        # The skin is elastic: it recovers whole.
+        return top / (hood / ratio + skin)
 
     def force(self, top: float, deepest: float, depth: float) -> float:
         """Return the force (N) on the way out."""
@@ -198,7 +202,7 @@ class _Unloading:
 def _unloading(hidden: Sequence[Hidden], lab: Laboratory) -> _Unloading:
     h = find(hidden, "unloading_slope")
     if h is None:
-        return _Unloading(lab.ratio)
+        return _Unloading(lab.ratio, skin=find(hidden, "skin_compliance"))
     if h.form == "curved":
         return _Unloading(lab.ratio, curvature=h.numbers["curvature"])
     if h.form == "deep":
@@ -276,15 +280,15 @@ def _strike(
 def _strike_sprung(
     law: Law, unloading: _Unloading, mass: float, speed: float, numbers: Mapping[str, float]
 ) -> Impact:
-    """Return the impact on a part of the hood that has mass, through a local spring and damper."""
+    """Return the impact on a part of the hood that has mass, through a local spring that loses energy."""
     part, spring = numbers["mass"], numbers["spring"]
-    damper = 2.0 * numbers["damping_ratio"] * float(np.sqrt(spring * part))
     head, rate, hood, hood_rate = 0.0, speed, 0.0, 0.0
     deepest = 0.0
     forces = []
     for _ in range(round(LONGEST / STEP)):
-        press = max(0.0, spring * (head - hood) + damper * (rate - hood_rate))
-        press = press if head > hood else 0.0
+        # K. Hunt and F. Crossley's damping: no force without penetration.
+        loss = max(0.0, 1.0 + numbers["loss"] * (rate - hood_rate))
+        press = spring * max(0.0, head - hood) * loss
         deepest = max(deepest, hood)
         below = law(hood, hood_rate)
         if hood < deepest:

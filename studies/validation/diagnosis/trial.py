@@ -6,7 +6,8 @@ gets, and are compared with its answer afterwards.
 
 import tempfile
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -77,6 +78,13 @@ class Outcome:
         Reason in words.
     seconds : float
         Time of the search.
+    evidence : mapping of str to float
+        Log evidence by cause.
+    share, left : float
+        Share of the misfit that the best cause explains, and what a free discrepancy would still
+        explain, log units.
+    flip_p_value : float
+        Of the sign flips.
     """
 
     trial: Trial
@@ -91,6 +99,10 @@ class Outcome:
     flagged: bool
     why: str
     seconds: float
+    evidence: Mapping[str, float] = field(default_factory=dict)
+    share: float = 1.0
+    left: float = 0.0
+    flip_p_value: float = 1.0
 
     @property
     def detected(self) -> bool:
@@ -138,6 +150,10 @@ def run_trial(trial: Trial, workers: int = 1) -> Outcome:
         flagged=finding.flagged,
         why=finding.why,
         seconds=seconds,
+        evidence={c.cause.name: c.log_evidence for c in finding.candidates},
+        share=1.0 if finding.remainder is None else finding.remainder.share,
+        left=0.0 if finding.remainder is None else finding.remainder.left,
+        flip_p_value=finding.screening.flip_p_value,
     )
 
 

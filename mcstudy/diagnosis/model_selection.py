@@ -40,7 +40,10 @@ STRUCTURE = 0.01
 MAX_SHARE = 0.8
 """Explained share of the misfit above which a cause is named despite remaining structure."""
 SCAN = Scatter(0.02, 0.02)
-"""Repeatability with which forms are tried before it is estimated."""
+"""Repeatability with which the base model is fitted before it is estimated, and the largest with
+which forms are tried."""
+LEAST_SCAN = 0.003
+"""Smallest repeatability with which forms are tried."""
 UNSEEN = 0.05
 """Whitened sum of squares below which a form changes nothing that was measured."""
 FAR = 0.7
@@ -96,6 +99,9 @@ class Remainder:
 def settle(problem: Problem, layouts: Sequence[Layout], fitted: Fit) -> Fit:
     """Return a fit with its repeatability re-estimated.
 
+    A discrepancy that all tests share, or that changes with their regime or order, stays free
+    meanwhile: the repeatability has mean zero and may not absorb what is common.
+
     Parameters
     ----------
     problem : Problem
@@ -104,15 +110,18 @@ def settle(problem: Problem, layouts: Sequence[Layout], fitted: Fit) -> Fit:
     fitted : Fit
         Fit to start from.
     """
-    for last in (False, True):
-        scatter = estimate_scatter(fitted, layouts, None)
-        start = rescale(layouts, fitted, scatter)
-        fitted = fit(problem, layouts, fitted.forms, start, scatter, fitted.slopes, exact=last)
-    return fitted
+    scatter = estimate_scatter(fitted, layouts, smooth_discrepancy(layouts, fitted))
+    start = rescale(layouts, fitted, scatter)
+    return fit(problem, layouts, fitted.forms, start, scatter, fitted.slopes, exact=False)
 
 
 def with_given_scatter(
-    problem: Problem, layouts: Sequence[Layout], fitted: Fit, scatter: Scatter
+    problem: Problem,
+    layouts: Sequence[Layout],
+    scatter: Scatter,
+    fitted: Fit,
+    *,
+    exact: bool = False,
 ) -> Fit:
     """Return a fit with a given repeatability, so that it does not absorb a misfit.
 
@@ -121,15 +130,17 @@ def with_given_scatter(
     problem : Problem
     layouts : sequence of Layout
         Of the tests.
-    fitted : Fit
-        Fit to start from.
     scatter : Scatter
         Repeatability to use.
+    fitted : Fit
+        Fit to start from.
+    exact : bool
+        Whether the final Jacobian must be that of the most probable latents.
     """
-    if scatter == fitted.scatter:
+    if scatter == fitted.scatter and not exact:
         return fitted
     start = rescale(layouts, fitted, scatter)
-    return fit(problem, layouts, fitted.forms, start, scatter, fitted.slopes, exact=False)
+    return fit(problem, layouts, fitted.forms, start, scatter, fitted.slopes, exact=exact)
 
 
 def rescale(layouts: Sequence[Layout], fitted: Fit, scatter: Scatter) -> Scores:
@@ -159,13 +170,15 @@ class Survey:
     Attributes
     ----------
     form : the form that was scanned.
+    scatter : repeatability of the survey.
     weight : of the data; the larger the misfit without the form, the smaller.
-    misfit : negative log posterior at the best start.
+    misfit : negative log posterior at the best start, or what the expected gain makes of it.
     promise : expected gain in log posterior if only the size of the form were free.
     starts : latents to start from, with nearby Jacobians, best first.
     """
 
     form: Form
+    scatter: Scatter
     weight: float
     misfit: float
     promise: float
@@ -182,6 +195,7 @@ def survey(
     layouts: Sequence[Layout],
     forms: tuple[Form, ...],
     centres: Sequence[Centre],
+    scatter: Scatter,
     form: Form,
 ) -> Survey | None:
     """Return the prior grid scan of a form, nuisances solved for in the linear model.
@@ -198,6 +212,8 @@ def survey(
     centres : sequence of Centre
         Points to linearise at: a misfit draws the most probable latents of a wrong model away from
         those of the right one.
+    scatter : Scatter
+        Repeatability of the survey.
     form : Form
         The one to add.
     """
@@ -210,20 +226,23 @@ def survey(
     least = min(solve(centre, centre.residuals, 1.0)[1] for centre in few)
     weight = min(1.0, float(np.sqrt(0.5 * samples / least)))
     best: list[tuple[float, Scores, Slopes]] = []
-    changes = promise = 0.0
+    changes = 0.0
+    lowest = expected = np.inf
     for centre, whole in zip(few, centres, strict=True):
         without = solve(centre, centre.residuals, weight)[1]
+        lowest = min(lowest, without)
         tried: list[tuple[float, Scores]] = []
         for scores in score_grid(form, fine=weight < FAR):
             start = Scores(np.concatenate([centre.scores.shared, scores]), centre.scores.own)
-            residuals = residuals_at(part, places, (*forms, form), start, SCAN)
+            residuals = residuals_at(part, places, (*forms, form), start, scatter)
             if residuals is None:
                 continue
             for found, before in zip(residuals, centre.residuals, strict=True):
                 changes = max(changes, float(np.sum((found - before) ** 2)))
             solved, misfit = solve(centre, residuals, weight)
             halfway = [0.5 * (r + b) for r, b in zip(residuals, centre.residuals, strict=True)]
-            promise = max(promise, _gain(without, solve(centre, halfway, weight)[1], misfit))
+            gain = _gain(without, solve(centre, halfway, weight)[1], misfit)
+            expected = min(expected, without - gain)
             shared = np.clip(solved.shared, -MAX_START, MAX_START)
             own = list(whole.scores.own)
             for i, z in zip(chosen, solved.own, strict=True):
@@ -237,7 +256,10 @@ def survey(
         return None
     best.sort(key=lambda entry: entry[0])
     starts = tuple((start, slopes) for _, start, slopes in best)
-    return Survey(form, weight, times * best[0][0], times * promise, starts)
+    # Steps of the grid are too large for a small effect in data of little noise.
+    reached = min(best[0][0], expected) if weight >= FAR else best[0][0]
+    promise = max(lowest - expected, 0.0)
+    return Survey(form, scatter, weight, times * reached, times * promise, starts)
 
 
 def _spread(layouts: Sequence[Layout]) -> list[int]:
@@ -290,13 +312,16 @@ def approach(
         try:
             for stage in (surveyed.weight, np.sqrt(surveyed.weight)) if surveyed.far else ():
                 found = fit(
-                    problem, layouts, forms, start, SCAN, slopes,
+                    problem, layouts, forms, start, surveyed.scatter, slopes,
                     exact=False, weight=stage, most=STAGE_STEPS,
                 )  # fmt: skip
                 slopes = found.slopes
                 # Nuisances absorbed the misfit of wrong shared values: they are reset.
                 start = Scores(found.scores.shared, tuple(np.zeros_like(z) for z in start.own))
-            found = fit(problem, layouts, forms, start, SCAN, slopes, exact=False, most=STAGE_STEPS)
+            found = fit(
+                problem, layouts, forms, start, surveyed.scatter, slopes,
+                exact=False, most=STAGE_STEPS,
+            )  # fmt: skip
         except FitError:
             continue
         if best is None or found.log_evidence > best.log_evidence:
@@ -314,7 +339,9 @@ def rank_causes(
 ) -> list[Candidate]:
     """Return the causes by evidence above a base's, best first.
 
-    Causes that change nothing that was measured, or cannot run, are left out.
+    All are compared at one repeatability, that of the best of them: a wrong cause would take what
+    it leaves for scatter. Causes that change nothing that was measured, or cannot run, are left
+    out.
 
     Parameters
     ----------
@@ -334,12 +361,13 @@ def rank_causes(
     shared = base.scores.shared.copy()
     shared[:unknowns] = 0.0
     own = tuple(np.zeros_like(z) for z in base.scores.own)
-    places = (Scores(shared, own), rescale(layouts, base, SCAN))
-    found = (linearise(problem, layouts, base.forms, place, SCAN) for place in places)
+    scan = _scan_scatter(base)
+    places = (Scores(shared, own), rescale(layouts, base, scan))
+    found = (linearise(problem, layouts, base.forms, place, scan) for place in places)
     centres = [centre for centre in found if centre is not None]
     taken = {form.cause for form in base.forms}
     forms = [form for c in causes if c.name not in taken for form in c.forms]
-    scans = run_jobs(partial(survey, problem, layouts, base.forms, centres), forms, workers)
+    scans = run_jobs(partial(survey, problem, layouts, base.forms, centres, scan), forms, workers)
     seen = sorted((s for s in scans if s is not None), key=lambda s: s.misfit)
     best = max((s.promise for s in seen), default=0.0)
     promising = [
@@ -350,7 +378,10 @@ def rank_causes(
     least = min((found.misfit for found in reached), default=0.0)
     # Forms far behind the best are pruned before their repeatability is re-estimated.
     kept = [found for found in reached if found.misfit < PRUNING_RATIO * least + CLOSE]
-    fits = run_jobs(partial(settle, problem, layouts), kept, workers)
+    settled = run_jobs(partial(settle, problem, layouts), kept, workers)
+    scatter = max([base, *settled], key=lambda fitted: fitted.log_evidence).scatter
+    refit = partial(with_given_scatter, problem, layouts, scatter, exact=True)
+    base, *fits = run_jobs(refit, [base, *settled], workers)
     candidates = []
     for cause in causes:
         own_fits = [
@@ -373,7 +404,16 @@ def rank_causes(
     return sorted(candidates, key=lambda candidate: -candidate.log_evidence)
 
 
-def examine(problem: Problem, layouts: Sequence[Layout], base: Fit, extended: Fit) -> Remainder:
+def _scan_scatter(base: Fit) -> Scatter:
+    """Return the repeatability with which forms are tried beside a base."""
+    level, shape = (
+        float(np.clip(size, LEAST_SCAN, most))
+        for size, most in ((base.scatter.level, SCAN.level), (base.scatter.shape, SCAN.shape))
+    )
+    return Scatter(level, shape)
+
+
+def examine(problem: Problem, layouts: Sequence[Layout], extended: Fit, gained: float) -> Remainder:
     """Return the remaining structure of an extended fit and the share of the misfit it explains.
 
     Parameters
@@ -381,10 +421,10 @@ def examine(problem: Problem, layouts: Sequence[Layout], base: Fit, extended: Fi
     problem : Problem
     layouts : sequence of Layout
         Of the tests.
-    base : Fit
-        Fit of the model without the extension.
     extended : Fit
         Fit of the extended model.
+    gained : float
+        Log evidence of the extension.
     """
     names = shared_names(problem, extended.forms)
     p_value, left, drift = remaining(
@@ -394,6 +434,6 @@ def examine(problem: Problem, layouts: Sequence[Layout], base: Fit, extended: Fi
         smooth_discrepancy(layouts, extended),
         fine_discrepancy(layouts, extended),
     )
-    gained = max(base.misfit - extended.misfit, 0.0)
-    whole = gained + max(left, 0.0)
-    return Remainder(p_value, gained / whole if whole > 0.0 else 1.0, max(left, 0.0), drift)
+    gained, left = max(gained, 0.0), max(left, 0.0)
+    whole = gained + left
+    return Remainder(p_value, gained / whole if whole > 0.0 else 1.0, left, drift)

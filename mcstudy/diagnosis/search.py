@@ -17,7 +17,6 @@ from mcstudy.diagnosis.model_selection import (
     examine,
     rank_causes,
     rescale,
-    settle,
 )
 from mcstudy.diagnosis.problem import Cause, Problem
 from mcstudy.diagnosis.screening import (
@@ -46,19 +45,16 @@ SECOND = 6.0
 """Log evidence that a second cause must add."""
 SINGLES, SECONDS = 30, 12
 """Forms that are refitted, as a single cause and as a second one."""
-SECOND_SHARE = 0.02
+FAINT_SHARE = 0.003
 """Share of the first cause's log evidence that a second one must add: even the best form of a
 large effect leaves a small residual."""
-ALMOST_ALL = 0.98
-"""Explained share of the misfit above which no second cause is sought."""
-FAINT_SHARE = 0.003
-"""``SECOND_SHARE`` where the first cause alone passes the general test of its residuals."""
 NOTABLE = 0.1
 """The same where the residuals of both causes have structure."""
 NEARLY_ALL = 0.99
 """Share of the misfit that two causes must explain where structure remains."""
-FURTHER = 4.5
-"""Template score, in standard errors, that indicates a second cause after the first one."""
+FURTHER, STILL = 3.5, 6.0
+"""Template score, in standard errors, and misfit that a discrepancy would still explain, in log
+units, that indicate a second cause after a first one whose residuals pass the general test."""
 MAX_SECONDS = 2
 """Largest number of indistinguishable second causes; with more of them none is named."""
 RIVAL = 0.5
@@ -188,9 +184,8 @@ def search(
     if not screening.alarm and not is_at_bound(base.scatter):
         return empty
     tell("the model is inadequate: fitting the causes")
-    settled = settle(problem, layouts, base)
-    candidates = rank_causes(problem, layouts, settled, causes, workers, SINGLES)
-    return _judge(problem, causes, replace(empty, base=settled), tuple(candidates), workers, tell)
+    candidates = rank_causes(problem, layouts, base, causes, workers, SINGLES)
+    return _judge(problem, causes, empty, tuple(candidates), workers, tell)
 
 
 def _judge(
@@ -212,11 +207,7 @@ def _judge(
             )  # fmt: skip
         return replace(nothing, why="no cause of the catalogue explains the misfit")
     best = candidates[0]
-    left = examine(problem, empty.layouts, empty.base, best.fitted)
-    if best.log_evidence < WIDENING * left.left:
-        return replace(
-            nothing, remainder=left, why="more of the misfit remains than the best cause explains"
-        )
+    left = examine(problem, empty.layouts, best.fitted, best.log_evidence)
     drift, evidence = empty.screening.drift
     if evidence > best.log_evidence + DISTINCT and left.p_value < STRUCTURE:
         return replace(nothing, remainder=left, why=f"a slow change explains more: {drift}")
@@ -232,13 +223,16 @@ def _judge(
     flagged = replace(
         alone, flagged=True, why="one cause explains most of the misfit; structure remains"
     )
-    if clean and not _trace(problem, causes, empty.layouts, best.fitted):
+    little = best.log_evidence < WIDENING * left.left
+    if (
+        clean
+        and not little
+        and left.left < STILL
+        and not _trace(problem, causes, empty.layouts, best.fitted)
+    ):
         return alone
-    if not clean and left.share >= ALMOST_ALL:
-        return flagged
     tell(f"looking for a second cause beside {best.cause.name}")
-    share = FAINT_SHARE if clean else SECOND_SHARE
-    found = _best_pair(problem, causes, empty, candidates, share, workers)
+    found = _best_pair(problem, causes, empty, candidates, left, workers)
     if found is not None:
         pair, rest, firsts = found
         explained = rest.p_value >= STRUCTURE
@@ -254,6 +248,10 @@ def _judge(
             why="two causes explain the misfit together"
             if explained
             else "two causes explain most of the misfit; structure remains",
+        )
+    if little:
+        return replace(
+            nothing, remainder=left, why="more of the misfit remains than the best cause explains"
         )
     if clean:
         return alone
@@ -293,8 +291,8 @@ class _Pair:
 
     @property
     def log_evidence(self) -> float:
-        """Log evidence of both together, averaged over the second cause's forms."""
-        return self.first.fitted.log_evidence + self.seconds[0].log_evidence
+        """Log evidence of both together, averaged over the forms of each."""
+        return self.first.log_evidence + self.seconds[0].log_evidence
 
     @property
     def second(self) -> str:
@@ -307,7 +305,7 @@ def _best_pair(
     causes: Sequence[Cause],
     empty: Finding,
     candidates: Sequence[Candidate],
-    share: float,
+    alone: Remainder,
     workers: int,
 ) -> tuple[_Pair, Remainder, tuple[str, ...]] | None:
     """Return the pair of causes that explains the misfit, None if no second cause is warranted.
@@ -316,8 +314,9 @@ def _best_pair(
 
     Parameters
     ----------
-    share : float
-        Share of the first cause's log evidence that the second one must add.
+    alone : Remainder
+        Remaining structure of the first cause alone. A second cause must add at least what a free
+        discrepancy would explain of it.
     """
     pairs: list[_Pair] = []
     for first in candidates[:PAIRS]:
@@ -331,10 +330,10 @@ def _best_pair(
     best = max(pairs, key=lambda pair: pair.log_evidence)
     if len(_near(best.seconds)) > MAX_SECONDS:
         return None
-    left = examine(problem, empty.layouts, empty.base, best.seconds[0].fitted)
     added, sole = best.seconds[0].log_evidence, best.first.log_evidence
+    left = examine(problem, empty.layouts, best.seconds[0].fitted, sole + added)
     if left.p_value >= STRUCTURE:
-        enough = added >= max(SECOND, share * sole)
+        enough = added >= max(SECOND, FAINT_SHARE * sole, alone.left)
     else:
         enough = left.share >= NEARLY_ALL and added >= NOTABLE * sole
     if not enough:

@@ -25,11 +25,13 @@ DRIFT = 2.0
 """Unit of a drift in latents per standard deviation of its covariate."""
 PULSE_DRIFT = 0.02
 """The same for the pulse, relative."""
-ONE_PARAMETER = (-2.0, -1.0, -0.3, 0.3, 1.0, 2.0)
+ONE_PARAMETER = (-2.0, -1.0, -0.3, -0.1, 0.1, 0.3, 1.0, 2.0)
 MORE_PARAMETERS = (-2.0, -1.0, 0.0, 1.0, 2.0)
 FINE = tuple(np.linspace(-2.5, 2.5, 17))
 BESIDE_FINE = (-1.5, 0.0, 1.5)
 """Latents of a cause's parameters at which it is tried, the third one at the last."""
+LEVELS, CHANGES = (-1.0, -0.2, 0.0, 0.2, 1.0), (-1.0, -0.3, -0.1, 0.1, 0.3, 1.0)
+"""Latents of a parameter with a trend, and of its change, at which it is tried."""
 STANDARD_GRID = 3
 """Number of free parameters on the grid; further ones stay at their median."""
 
@@ -59,13 +61,30 @@ class Shapes:
 
 
 def score_grid(form: Form, *, fine: bool = False) -> list[Array]:
-    """Return the latents at which a form is tried; ``fine`` refines the first one's grid."""
+    """Return the latents at which a form is tried; ``fine`` refines the first one's grid.
+
+    The entries of a table, which follow its first parameter, move together. Of a trend, the
+    parameter and its change are moved.
+    """
     count = form.size
+    if form.trend is not None:
+        moved = form.trend.parameter
+        return [
+            np.array([level if k == moved else 0.0 for k in range(count - 1)] + [change])
+            for level in (FINE if fine else LEVELS)
+            for change in CHANGES
+        ]
+    if not form.named and count > STANDARD_GRID:
+        return [
+            np.array([a, *[b] * (count - 1)])
+            for a in (FINE if fine else MORE_PARAMETERS)
+            for b in MORE_PARAMETERS
+        ]
     if count == 0:
         return [np.zeros(0)]
-    first: Sequence[float] = FINE if fine else MORE_PARAMETERS
     if count == 1:
         return [np.array([z]) for z in (FINE if fine else ONE_PARAMETER)]
+    first: Sequence[float] = FINE if fine else MORE_PARAMETERS
     others: Sequence[float] = BESIDE_FINE if fine else MORE_PARAMETERS
     axes = [first] + [others] * (min(count, STANDARD_GRID) - 1)
     axes = [*axes[:2], *(BESIDE_FINE for _ in axes[2:])]

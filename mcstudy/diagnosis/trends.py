@@ -1,4 +1,4 @@
-"""Causes whose size changes from test to test along a covariate: a drift, or a scale that is off."""
+"""Causes whose size changes from test to test along a covariate: a drift, or a wrong scale."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,9 +20,7 @@ def add_trends(causes: Sequence[Cause], tests: Sequence[Test]) -> tuple[Cause, .
     tests : sequence of Test
         Covariates that are the same in all of them, or missing, give no form.
     """
-    return tuple(
-        replace(cause, forms=(*cause.forms, *_trending(cause, tests))) for cause in causes
-    )
+    return tuple(replace(cause, forms=(*cause.forms, *_trending(cause, tests))) for cause in causes)
 
 
 def _trending(cause: Cause, tests: Sequence[Test]) -> list[Form]:
@@ -41,7 +39,5 @@ def _trending(cause: Cause, tests: Sequence[Test]) -> list[Form]:
         centre, scale = float(values.mean()), float(values.std())
         if scale > 1e-9 * abs(centre):
             trend = Trend(name, parameter, centre, scale)
-            found.append(
-                replace(form, name=f"{form.name} with {name}", trend=trend, named=False)
-            )
+            found.append(replace(form, name=f"{form.name} with {name}", trend=trend, named=False))
     return found

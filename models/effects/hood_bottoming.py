@@ -1,8 +1,8 @@
 """Hood bottoming: the hood meets a structure below it after a clearance.
 
 Beyond the clearance the force grows by ``stiffness * depth * (depth / 10 mm)^(power - 1)``,
-approximated by straight segments. In the free form the slopes of three segments have factors of
-their own.
+approximated by straight segments. In the free form the stiffness is that of the first of three
+segments, and the two others have factors of their own on it.
 """
 
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ DEPTHS = (0.002, 0.004, 0.007, 0.01, 0.014, 0.02, 0.04)
 """Depths (m) beyond the clearance of the knots of a curved law."""
 SEGMENTS = (0.003, 0.008, 0.04)
 """Depths (m) beyond the clearance at which the segments of the free form end."""
-SLOPES = ("to_3_mm", "to_8_mm", "beyond_8_mm")
+SLOPES = ("to_8_mm", "beyond_8_mm")
 
 NEAREST = 1e-6
 """m from a knot of the curve within which none is added."""
@@ -29,7 +29,7 @@ def apply(curve: ForceCurve, parameters: Mapping[str, float]) -> ForceCurve:
     clearance, power = parameters["clearance"], parameters["power"]
     if parameters["stiffness"] == 0.0:
         return curve
-    slopes = [parameters[name] for name in SLOPES]
+    slopes = [1.0, *(parameters[name] for name in SLOPES)]
     free = any(slope != 1.0 for slope in slopes)
     depths = np.array([0.0, *(SEGMENTS if free else DEPTHS if power > 1.0 else DEPTHS[-1:])])
     added_knots = clearance + depths

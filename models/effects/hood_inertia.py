@@ -17,8 +17,8 @@ from models.contact.headform import HeadformContact
 REACH, KNOTS = 4.0, 33
 """Penetration over the depth up to which mass is picked up, and places of its table."""
 PLACES = (0.0, 0.002, 0.005, 0.01, 0.02)
-"""Penetrations (m) of the weights of the free form, the last one without."""
-WEIGHTS = ("at_0_mm", "at_2_mm", "at_5_mm", "at_10_mm")
+"""Penetrations (m) of the weights of the free form: 1 at the first, 0 at the last."""
+WEIGHTS = ("at_2_mm", "at_5_mm", "at_10_mm")
 
 
 def apply(contact: HeadformContact, parameters: Mapping[str, float]) -> HeadformContact:
@@ -35,7 +35,7 @@ def apply(contact: HeadformContact, parameters: Mapping[str, float]) -> Headform
     weights = [parameters[name] for name in WEIGHTS]
     if any(weights):
         places = np.array(PLACES)
-        growth = np.array([*weights, 0.0])
+        growth = np.array([1.0, *weights, 0.0])
     else:
         places = depth * np.linspace(0.0, REACH, KNOTS)
         growth = places * np.exp(-((places / depth) ** 2))

@@ -17,7 +17,7 @@ ONSET = 0.002
 has no jump at first touch)."""
 PLACES = (0.0, 0.002, 0.005, 0.01, 0.02, 0.04)
 """Penetrations (m) of the free form, the first without force."""
-WEIGHTS = ("at_2_mm", "at_5_mm", "at_10_mm", "at_20_mm", "at_40_mm")
+FORCES = ("at_2_mm", "at_5_mm", "at_10_mm", "at_20_mm", "at_40_mm")
 
 
 def apply(contact: HeadformContact, parameters: Mapping[str, float]) -> HeadformContact:
@@ -29,7 +29,7 @@ def apply(contact: HeadformContact, parameters: Mapping[str, float]) -> Headform
         rate_share=parameters["share"],
         rate_exponent=parameters["exponent"],
     )
-    if parameters["force"] == 0.0:
+    added = np.array([0.0, *(parameters[name] for name in FORCES)])
+    if not np.any(added):
         return changed
-    added = parameters["force"] * np.array([0.0, *(parameters[name] for name in WEIGHTS)])
     return replace(changed, rate_force=np.stack([np.array(PLACES), added], axis=1))

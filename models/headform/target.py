@@ -165,9 +165,7 @@ SKIN_REFERENCE = 4000.0
 """N at which the compliance of a skin is given (a usual peak of a headform test)."""
 
 
-def skin_of(
-    skin: ForceCurve | None, contact: HeadformContact, force: float
-) -> ForceCurve | None:
+def skin_of(skin: ForceCurve | None, contact: HeadformContact, force: float) -> ForceCurve | None:
     """Return a headform's skin in series with an elastic spring.
 
     Parameters

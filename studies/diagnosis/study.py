@@ -87,7 +87,8 @@ def diagnose(
     choice = choose_model(data, model_config)
     simulation = simulation_of(data, choice)
     problem = build_problem(data, choice, simulation)
-    causes = tuple(c for c in causes_of(choice.name, choice.options) if c.name not in choice.effects)
+    catalogue = causes_of(choice.name, choice.options)
+    causes = tuple(cause for cause in catalogue if cause.name not in choice.effects)
     say(f"{len(problem.tests)} tests, {len(causes)} causes", quiet=quiet)
     source_of_extras: Simulation | Emulator = simulation
     if is_collection(data):
@@ -124,7 +125,7 @@ def _write(
     layouts = finding.layouts
     where = locate_misfit(finding.base, layouts)
     believed = finding.best or finding.base
-    calm = with_given_scatter(problem, layouts, finding.base, believed.scatter)
+    calm = with_given_scatter(problem, layouts, believed.scatter, finding.base)
     visible = minimum_detectable_effects(
         problem, layouts, calm, causes, finding.screening.threshold
     )

@@ -9,7 +9,7 @@ import pytest
 from mcstudy.diagnosis.problem import Cause
 from mcstudy.diagnosis.screening import score_templates
 from mcstudy.diagnosis.search import fit_base, search
-from mcstudy.diagnosis.templates import named_forms, cause_templates
+from mcstudy.diagnosis.templates import cause_templates, named_forms
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.measurement.isomme import write_test
 from mcstudy.measurement.measured_data import load_measured

@@ -148,16 +148,15 @@ def test_powers_of_bottoming_meet_at_ten_millimetres() -> None:
 
 
 def test_a_free_form_whose_weights_are_equal_is_the_named_form() -> None:
-    weights = {f"at_{depth}_mm": 1.0 for depth in (2, 5, 10, 20, 40)}
+    forces = {f"at_{depth}_mm": 480.0 for depth in (2, 5, 10, 20, 40)}
     dashpot = struck({"rate_dependent_hood": {"damping": 60.0, "share": 0.0}})
     free = struck({
-        "rate_dependent_hood": {"damping": 0.0, "share": 0.0, "exponent": 1.0, "force": 480.0}
-        | weights
+        "rate_dependent_hood": {"damping": 0.0, "share": 0.0, "exponent": 1.0} | forces
     })  # fmt: skip
     for channel, values in dashpot.histories["head"].channels.items():
         np.testing.assert_allclose(free.histories["head"].channels[channel], values, rtol=1e-6)
     linear = {"clearance": 0.03, "stiffness": 3e5, "power": 1.0}
-    slopes = {"to_3_mm": 1.0 + 1e-12, "to_8_mm": 1.0, "beyond_8_mm": 1.0}
+    slopes = {"to_8_mm": 1.0 + 1e-12, "beyond_8_mm": 1.0}
     named = struck({"hood_bottoming": linear})
     assert struck({"hood_bottoming": linear | slopes}).outputs == pytest.approx(
         named.outputs, rel=1e-6, nan_ok=True

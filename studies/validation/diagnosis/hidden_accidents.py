@@ -4,7 +4,7 @@ Nothing of the diagnosis's catalogue is used: a wet road is a run with less fric
 slide beyond a place, a nose that dives more is another angle, a softer hood another factor.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +23,28 @@ RECORDED = {"impact_speed": ("m/s", 0.8), "stature": ("m", 0.0), "body_mass": ("
 """Recorded inputs of an accident: unit and standard uncertainty."""
 SCALARS = {"throw_distance": ("m", 0.5), "wad": ("m", 0.04), "hic15": ("1", 60.0)}
 """Measured scalars: unit and standard uncertainty."""
+
+Alter = Callable[[Array, Mapping[str, float]], Array]
+
+
+def _times(values: Array, numbers: Mapping[str, float]) -> Array:
+    return values * numbers["factor"]
+
+
+def _over(values: Array, numbers: Mapping[str, float]) -> Array:
+    return values / numbers["factor"]
+
+
+ALTERED: dict[str, dict[str, Alter]] = {
+    "brake_dive": {"dive_angle": lambda values, numbers: values + numbers["angle"]},
+    "hood_force_scale": {"hood_force_scale": _times},
+    "mass_error": {"body_mass": _times},
+    "muscle_tone": {"neck_stiffness": _times, "muscle_tone": _times},
+    "shoulder_compliance": {"shoulder_stiffness": _over},
+    "speed_bias": {"impact_speed": _times},
+    "friction_level": {"friction_body_road": _times},
+}
+"""Effects by the inputs that differ from the recorded ones."""
 
 
 def make_accidents(
@@ -71,15 +93,8 @@ def make_accidents(
 def alter(columns: dict[str, Array], hidden: Sequence[Hidden]) -> dict[str, Array]:
     """Return the inputs as they truly were."""
     for h in hidden:
-        if h.name == "brake_dive":
-            columns["dive_angle"] = columns["dive_angle"] + h.numbers["angle"]
-        elif h.name == "hood_force_scale":
-            columns["hood_force_scale"] = columns["hood_force_scale"] * h.numbers["factor"]
-        elif h.name == "speed_bias":
-            columns["impact_speed"] = columns["impact_speed"] * h.numbers["factor"]
-        elif h.name == "muscle_tone":
-            for name in ("neck_stiffness", "muscle_tone"):
-                columns[name] = columns[name] * h.numbers["factor"]
+        for name, how in ALTERED.get(h.name, {}).items():
+            columns[name] = how(columns[name], h.numbers)
     return columns
 
 

@@ -1,11 +1,13 @@
-"""Full-scale tests with a hidden effect: the crash core with altered inputs, seen by an instrument.
+"""Full-scale tests with a hidden effect: a crash model with altered inputs, seen by an instrument.
 
-Nothing of the diagnosis's catalogue is used: errors of the accelerometer are applied to the signal,
-the other effects are inputs that differ from those that the folder states.
+Nothing of the diagnosis's catalogue is used: errors of the instruments are applied to the raw
+signal by the code of the hidden headform tests, the others are inputs or a loading curve that
+differ from those that the folder states.
 """
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,6 +15,8 @@ from numpy.typing import NDArray
 
 from models.registry import load_model
 from studies.validation.diagnosis.hidden_accidents import alter
+from studies.validation.diagnosis.hidden_hood import find
+from studies.validation.diagnosis.hidden_instrument import clock, filtered, read
 from studies.validation.diagnosis.laboratory import Hidden
 
 Array = NDArray[np.float64]
@@ -29,10 +33,92 @@ HOOD_SD = 0.1
 SCALARS = {"throw_distance": ("m", 0.3), "wad": ("m", 0.02)}
 AFTER_HEAD = 0.03
 """s that are recorded after the head's contact began."""
+RATE = 10_000.0
+"""Hz of the recorder."""
+HOOD = ((0.0, 0.0), (0.02, 1100.0), (0.06, 2600.0), (0.1, 3600.0))
+"""The hood's loading curve, m and N."""
 
-HEADER = f"""format = "mcstudy-measured/1"
+
+def make_crashes(
+    folder: Path,
+    hidden: Sequence[Hidden],
+    seed: int,
+    tests: int = 5,
+    model: str = "multibody",
+    stated: str | None = None,
+) -> None:
+    """Write a folder of full-scale tests with the effects in it.
+
+    Parameters
+    ----------
+    folder : path
+        New folder.
+    hidden : sequence of Hidden
+        Effects, by altered inputs, curves or signals.
+    seed : int
+        Seed of the draws.
+    tests : int
+        Number of tests.
+    model : str
+        Model that stands for reality.
+    stated : str, optional
+        Model that the folder names to be diagnosed, by default the same.
+    """
+    rng = np.random.default_rng(seed)
+    options: dict[str, Any] = {"channel_class": 0.0, "hood_curve": _curve(hidden)}
+    reality = load_model(model, options)
+    nominal = {item.name: np.full(tests, item.nominal) for item in reality.inputs}
+    speeds = np.linspace(*SPEEDS, tests)
+    rng.shuffle(speeds)
+    given = nominal | {"impact_speed": speeds}
+    given["hood_force_scale"] = np.full(tests, np.exp(HOOD_SD * rng.standard_normal()))
+    true = alter({name: values.copy() for name, values in given.items()}, hidden)
+    (folder / "signals").mkdir(parents=True)
+    rows = []
+    for k in range(tests):
+        run = reality.run({name: float(values[k]) for name, values in true.items()})
+        head = run.histories["head"]
+        progress = k / (tests - 1)
+        share = 1.0 + SCATTER * rng.standard_normal()
+        felt = read(hidden, share * head.channels["acceleration"], head.time, progress)
+        kept = head.time <= run.outputs["head_impact_time"] + AFTER_HEAD
+        shown = filtered(felt, RATE, hidden)[kept] + NOISE_SD * rng.standard_normal(kept.sum())
+        name = f"c{k + 1}"
+        pd.DataFrame({"time": clock(hidden, head.time[kept]), "head_acceleration": shown}).to_csv(
+            folder / "signals" / f"{name}.csv", index=False
+        )
+        row = {"test": name, "impact_speed": speeds[k] + SPEED_SD * rng.standard_normal()}
+        for scalar, (_, sd) in SCALARS.items():
+            row[scalar] = run.outputs[scalar] * (1.0 + SCATTER * rng.standard_normal())
+            row[scalar] += sd * rng.standard_normal()
+        rows.append(row)
+    pd.DataFrame(rows).to_csv(folder / "tests.csv", index=False)
+    (folder / "measured.toml").write_text(_header(stated or model), encoding="utf-8")
+
+
+def _curve(hidden: Sequence[Hidden]) -> list[list[float]]:
+    """Return the hood's loading curve as it truly is."""
+    x, force = np.array(HOOD).T
+    depth = np.unique(np.concatenate([x, np.linspace(0.005, 0.1, 12)]))
+    true = np.interp(depth, x, force)
+    if (h := find(hidden, "hood_bottoming")) is not None:
+        beyond = np.maximum(0.0, depth - h.numbers["clearance"])
+        true = true + h.numbers["stiffness"] * beyond**1.5 / 0.1
+    if (h := find(hidden, "hood_yield")) is not None:
+        above = np.maximum(0.0, true - h.numbers["force"])
+        true = true - (1.0 - h.numbers["remaining"]) * above
+    knots: list[list[float]] = np.stack([depth, true], axis=1).tolist()
+    return knots
+
+
+def _header(model: str) -> str:
+    knots = ", ".join(f"[{x}, {f}]" for x, f in HOOD)
+    text = f"""format = "mcstudy-measured/1"
 title = "Child dummy, family car"
-model = "multibody"
+model = "{model}"
+
+[fixed]
+hood_curve = [{knots}]
 
 [uncertain.hood_force_scale]
 distribution = "lognormal"
@@ -48,60 +134,6 @@ unit = "g"
 sd = {NOISE_SD}
 filter = "CFC1000"
 """
-
-
-def make_crashes(folder: Path, hidden: Sequence[Hidden], seed: int, tests: int = 5) -> None:
-    """Write a folder of full-scale tests with the effects in it.
-
-    Parameters
-    ----------
-    folder : path
-        New folder.
-    hidden : sequence of Hidden
-        Effects, by altered inputs or signals.
-    seed : int
-        Seed of the draws.
-    tests : int
-        Number of tests.
-    """
-    rng = np.random.default_rng(seed)
-    model = load_model("multibody")
-    nominal = {item.name: np.full(tests, item.nominal) for item in model.inputs}
-    speeds = np.linspace(*SPEEDS, tests)
-    rng.shuffle(speeds)
-    given = nominal | {"impact_speed": speeds}
-    given["hood_force_scale"] = np.full(tests, np.exp(HOOD_SD * rng.standard_normal()))
-    true = alter({name: values.copy() for name, values in given.items()}, hidden)
-    (folder / "signals").mkdir(parents=True)
-    rows = []
-    for k in range(tests):
-        run = model.run({name: float(values[k]) for name, values in true.items()})
-        head = run.histories["head"]
-        kept = head.time <= run.outputs["head_impact_time"] + AFTER_HEAD
-        share = 1.0 + SCATTER * rng.standard_normal()
-        shown = share * _read(head.channels["acceleration"][kept], hidden)
-        shown += NOISE_SD * rng.standard_normal(shown.size)
-        name = f"c{k + 1}"
-        pd.DataFrame({"time": head.time[kept], "head_acceleration": shown}).to_csv(
-            folder / "signals" / f"{name}.csv", index=False
-        )
-        row = {"test": name, "impact_speed": speeds[k] + SPEED_SD * rng.standard_normal()}
-        for scalar, (_, sd) in SCALARS.items():
-            row[scalar] = run.outputs[scalar] * (1.0 + SCATTER * rng.standard_normal())
-            row[scalar] += sd * rng.standard_normal()
-        rows.append(row)
-    pd.DataFrame(rows).to_csv(folder / "tests.csv", index=False)
-    scalars = "".join(
+    return text + "".join(
         f'\n[scalars.{name}]\nunit = "{unit}"\nsd = {sd}\n' for name, (unit, sd) in SCALARS.items()
     )
-    (folder / "measured.toml").write_text(HEADER + scalars, encoding="utf-8")
-
-
-def _read(acceleration: Array, hidden: Sequence[Hidden]) -> Array:
-    """Return what the accelerometer reads."""
-    for h in hidden:
-        if h.name == "sensor_gain":
-            acceleration = acceleration * h.numbers["factor"]
-        elif h.name == "sensor_saturation":
-            acceleration = np.minimum(acceleration, h.numbers["limit"])
-    return acceleration

@@ -81,7 +81,7 @@ def _loading(hidden: Sequence[Hidden], lab: Laboratory, scale: float, order: int
     progress = order / max(lab.tests - 1, 1)
 
     def plain(depth: float) -> float:
-        force = scale * (float(np.interp(depth, x, f)) + last * max(0.0, depth - x[-1]))
+        force = scale * float(np.interp(depth, x, f) + last * max(0.0, depth - x[-1]))
         if (h := changes.get("hood_force_scale")) is not None:
             if h.form == "ageing":
                 force *= 1.0 - h.numbers["loss"] * progress
@@ -147,16 +147,16 @@ def _yielded(force: float, h: Hidden) -> float:
 def _bottoming(beyond: float, h: Hidden) -> float:
     stiffness = h.numbers["stiffness"]
     if h.form == "quadratic":
-        return stiffness * beyond**2 / 0.01
+        return float(stiffness * beyond**2 / 0.01)
     if h.form == "hertz":
-        return stiffness * beyond**1.5 / 0.1
+        return float(stiffness * beyond**1.5 / 0.1)
     if h.form == "soft_start":
         # The stiffness fades in over a soft layer.
         layer = h.numbers["layer"]
-        return stiffness * (beyond - layer * (1.0 - np.exp(-beyond / layer)))
+        return float(stiffness * (beyond - layer * (1.0 - np.exp(-beyond / layer))))
     if h.form == "hardening":
-        return stiffness * 0.01 * np.expm1(beyond / 0.01)
-    return stiffness * beyond
+        return float(stiffness * 0.01 * np.expm1(beyond / 0.01))
+    return float(stiffness * beyond)
 
 
 def _rate_force(force: float, depth: float, rate: float, h: Hidden) -> float:
@@ -168,7 +168,8 @@ def _rate_force(force: float, depth: float, rate: float, h: Hidden) -> float:
         return numbers["damping"] * rate * min(1.0, depth / numbers["ramp"])
     if h.form == "fading":
         # A dashpot of the outer panel alone, gone once it touches the inner one.
-        return numbers["damping"] * rate * min(1.0, depth / 0.002) * np.exp(-depth / numbers["end"])
+        left = float(np.exp(-depth / numbers["end"]))
+        return numbers["damping"] * rate * min(1.0, depth / 0.002) * left
     if h.form == "relative":
         return force * numbers["per_speed"] * rate
     if h.form == "logarithmic":
@@ -191,12 +192,12 @@ class _Unloading:
         hood = deepest - skin
         ratio = 1.0 + (self.ratio - 1.0) * (hood / 0.03) ** self.growth
         # The skin is elastic: it recovers whole.
-        return top / (hood / ratio + skin)
+        return float(top / (hood / ratio + skin))
 
     def force(self, top: float, deepest: float, depth: float) -> float:
         """Return the force (N) on the way out."""
         share = 1.0 + self.slope(top, deepest) * (depth - deepest) / top
-        return top * max(0.0, share) ** self.curvature
+        return float(top * max(0.0, share) ** self.curvature)
 
 
 def _unloading(hidden: Sequence[Hidden], lab: Laboratory) -> _Unloading:
@@ -267,8 +268,8 @@ def _strike(
         found = np.zeros(time.size)
         for k, t in enumerate(time):
             if 0.0 <= t <= turn:
-                depth, rate = into_hood(float(t))
-                found[k] = mass * slowing(float(depth), float(rate))
+                depth, rate = map(float, into_hood(float(t)))
+                found[k] = mass * slowing(depth, rate)
             elif turn < t <= end:
                 depth = float(out_of_hood(float(t))[0])
                 found[k] = mass * unloading.force(top, deepest, depth) / heavy
@@ -280,7 +281,7 @@ def _strike(
 def _strike_sprung(
     law: Law, unloading: _Unloading, mass: float, speed: float, numbers: Mapping[str, float]
 ) -> Impact:
-    """Return the impact on a part of the hood that has mass, through a local spring that loses energy."""
+    """Return the impact on a part of the hood that has mass, through a local spring."""
     part, spring = numbers["mass"], numbers["spring"]
     head, rate, hood, hood_rate = 0.0, speed, 0.0, 0.0
     deepest = 0.0

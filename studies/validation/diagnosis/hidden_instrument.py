@@ -1,4 +1,4 @@
-"""The instruments of the hidden effects: what accelerometer, filter, clock and speed gate record."""
+"""The instruments of the hidden effects: accelerometer, filter, clock and speed gate."""
 
 from collections.abc import Callable, Sequence
 
@@ -41,7 +41,8 @@ def read(hidden: Sequence[Hidden], acceleration: Array, time: Array, progress: f
 def _gain(h: Hidden, acceleration: Array, _time: Array, progress: float) -> Array:
     if h.form == "warming":
         # The amplifier warms up over the first tests and then stays warm.
-        return acceleration * (1.0 + h.numbers["change"] * (1.0 - np.exp(-3.0 * progress)))
+        warm = 1.0 - float(np.exp(-3.0 * progress))
+        return acceleration * (1.0 + h.numbers["change"] * warm)
     return acceleration * h.numbers["factor"]
 
 

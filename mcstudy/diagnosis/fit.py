@@ -5,7 +5,6 @@ every test's own nuisances; the Jacobian is block-arrow, so tests are eliminated
 evidence is Laplace's approximation.
 """
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -202,10 +201,10 @@ def fit(
     misfit = _misfit(layouts, seen, scores, scatter, weight)
     slopes, fresh, simulated = known, False, known is None
     if known is not None and known.shared[0].shape[1] < scores.shared.size:
-        slopes = _simulate_slopes(problem, forms, layouts, scores, seen, scatter, known)
+        slopes = simulate_slopes(problem, forms, layouts, scores, seen, scatter, known)
     for step in range(most + 1):
         if slopes is None:
-            slopes = _simulate_slopes(problem, forms, layouts, scores, seen, scatter)
+            slopes = simulate_slopes(problem, forms, layouts, scores, seen, scatter)
             fresh = simulated = True
         residuals, own = expand_tests(layouts, seen, scores, slopes, scatter)
         system = NormalEquations(own, slopes.shared, weight)
@@ -241,72 +240,6 @@ def fit(
     )
 
 
-@dataclass(frozen=True)
-class Centre:
-    """A model linearised at a point.
-
-    Attributes
-    ----------
-    scores : latents of the point.
-    residuals : (n,) whitened, one a test.
-    slopes : Jacobian blocks that take runs.
-    own_slopes : (n, q) whitened Jacobian in the test's own nuisances, one a test.
-    """
-
-    scores: Scores
-    residuals: tuple[Array, ...]
-    slopes: Slopes
-    own_slopes: tuple[Array, ...]
-
-    def equations(self, weight: float) -> NormalEquations:
-        """Return the normal equations at a weight of the data, cached."""
-        if weight not in self._made:
-            self._made[weight] = NormalEquations(self.own_slopes, self.slopes.shared, weight)
-        return self._made[weight]
-
-    def of_tests(self, chosen: Sequence[int]) -> "Centre":
-        """Return the linearised model of some of its tests."""
-        return Centre(
-            Scores(self.scores.shared, tuple(self.scores.own[i] for i in chosen)),
-            tuple(self.residuals[i] for i in chosen),
-            Slopes(
-                tuple(self.slopes.doubtful[i] for i in chosen),
-                tuple(self.slopes.shared[i] for i in chosen),
-            ),
-            tuple(self.own_slopes[i] for i in chosen),
-        )
-
-    @functools.cached_property
-    def _made(self) -> dict[float, NormalEquations]:
-        return {}
-
-
-def linearise(
-    problem: Problem,
-    layouts: Sequence[Layout],
-    forms: Sequence[Form],
-    scores: Scores,
-    scatter: Scatter,
-) -> Centre | None:
-    """Return the linearised model; None if a run fails.
-
-    Parameters
-    ----------
-    problem : Problem
-    layouts : sequence of Layout
-    forms : sequence of Form
-    scores : Scores
-        Latents to linearise at.
-    scatter : Scatter
-    """
-    seen = observe_tests(problem, forms, layouts, scores)
-    if seen is None:
-        return None
-    slopes = _simulate_slopes(problem, forms, layouts, scores, seen, scatter)
-    residuals, own = expand_tests(layouts, seen, scores, slopes, scatter)
-    return Centre(scores, tuple(residuals), slopes, tuple(own))
-
-
 def residuals_at(
     problem: Problem,
     layouts: Sequence[Layout],
@@ -332,26 +265,6 @@ def residuals_at(
         layout.residual(part, own, scatter)
         for layout, part, own in zip(layouts, seen, scores.own, strict=True)
     )
-
-
-def solve(centre: Centre, residuals: Sequence[Array], weight: float) -> tuple[Scores, float]:
-    """Return the most probable latents of the linear model and their negative log posterior.
-
-    Parameters
-    ----------
-    centre : Centre
-    residuals : sequence of (n,) array
-        Whitened, one a test.
-    weight : float
-        Weight of the data against the priors.
-    """
-    planned = centre.equations(weight).solve(residuals, centre.scores)
-    own = tuple(z + d for z, d in zip(centre.scores.own, planned.move.own, strict=True))
-    squares = weight**2 * sum(float(r @ r) for r in residuals)
-    squares += float(centre.scores.shared @ centre.scores.shared)
-    squares += sum(float(z @ z) for z in centre.scores.own)
-    moved = Scores(centre.scores.shared + planned.move.shared, own)
-    return moved, 0.5 * squares - planned.expected_gain
 
 
 def _misfit(
@@ -396,7 +309,7 @@ def expand_tests(
     return residuals, owns
 
 
-def _simulate_slopes(
+def simulate_slopes(
     problem: Problem,
     forms: Sequence[Form],
     layouts: Sequence[Layout],
@@ -407,7 +320,18 @@ def _simulate_slopes(
 ) -> Slopes:
     """Return the Jacobian blocks that take runs, by one-sided differences to a side that runs.
 
-    Known blocks are kept; missing shared columns come last.
+    Parameters
+    ----------
+    problem : Problem
+    forms : sequence of Form
+    layouts : sequence of Layout
+    scores : Scores
+        Latents to differentiate at.
+    seen : sequence of Observation
+        Tests simulated there.
+    scatter : Scatter
+    known : Slopes, optional
+        Blocks that are kept; missing shared columns come last.
     """
     residuals = [
         layout.residual(observation, own, scatter)

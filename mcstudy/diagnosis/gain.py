@@ -23,23 +23,29 @@ from mcstudy.statistics import Estimate
 Array = NDArray[np.float64]
 Quantity = Callable[[Array, Array], float]
 """Maps time (s) and values of a signal to a number, such as HIC15."""
+Quantities = Mapping[str, tuple[str, str, Quantity]]
+"""Unit, signal and function by name."""
 
 FOLDS = 6
+TINY = 1e-12
 DRAWS = 200
 RESAMPLES = 2000
-BEYOND = 0.25
-"""Share of the tests, those at the top of the regime, that are held out together."""
+BEYOND = 0.2
+"""Share of the tests, the fastest or the slowest, that are held out together."""
+INTERVAL = 0.9
+"""Probability of the predictive intervals whose coverage is counted."""
 MODELS = ("base", "extended", "gaussian_process")
 
 
 @dataclass(frozen=True)
 class Gain:
-    """A predictive score of the three models; smaller is better for all but the log score.
+    """A predictive score of the three models; smaller is better but for log score and coverage.
 
     Attributes
     ----------
-    score : its name.
-    region : ``inside`` or ``beyond`` the regime of the tests that were used.
+    score : its name; ``coverage_`` is the share of tests within the 90 % intervals.
+    region : where the held-out tests lie: ``inside`` the regime of those that were used, ``above``
+        or ``below`` it.
     unit : of the score.
     base, extended, gaussian_process : means over the held-out tests.
     difference : extended against base, positive if better, with its interval.
@@ -71,7 +77,7 @@ def measure_gain(
     layouts: Sequence[Layout],
     base: Fit,
     extended: Fit,
-    quantities: Mapping[str, tuple[str, str, Quantity]],
+    quantities: Quantities,
     seed: int,
 ) -> list[Gain]:
     """Return the scores of held-out tests, inside the tested regime and beyond it.
@@ -94,20 +100,20 @@ def measure_gain(
     folds = [order[k :: min(FOLDS, count)] for k in range(min(FOLDS, count))]
     found = _score(problem, layouts, base, extended, quantities, folds, rng)
     gains = _compare(found, "inside", quantities, rng)
-    top = _top(layouts)
-    if top.size:
-        found = _score(problem, layouts, base, extended, quantities, [top], rng)
-        gains += _compare(found, "beyond", quantities, rng)
+    for region, held in _ends(layouts).items():
+        found = _score(problem, layouts, base, extended, quantities, [held], rng)
+        gains += _compare(found, region, quantities, rng)
     return gains
 
 
-def _top(layouts: Sequence[Layout]) -> NDArray[np.int64]:
-    """Return the tests at the top of the impact speed, if it differs."""
+def _ends(layouts: Sequence[Layout]) -> dict[str, NDArray[np.int64]]:
+    """Return the fastest and the slowest tests, if the impact speed differs."""
     speeds = np.array([layout.test.inputs.get("impact_speed", 0.0) for layout in layouts])
     size = round(BEYOND * speeds.size)
     if np.ptp(speeds) == 0.0 or size < 2:
-        return np.zeros(0, dtype=np.int64)
-    return np.argsort(speeds)[-size:]
+        return {}
+    order = np.argsort(speeds, kind="stable")
+    return {"above": order[-size:], "below": order[:size]}
 
 
 Scored = dict[str, dict[str, list[float]]]
@@ -119,7 +125,7 @@ def _score(
     layouts: Sequence[Layout],
     base: Fit,
     extended: Fit,
-    quantities: Mapping[str, tuple[str, str, Quantity]],
+    quantities: Quantities,
     folds: Sequence[NDArray[np.int64]],
     rng: np.random.Generator,
 ) -> Scored:
@@ -260,7 +266,7 @@ def _judge(
     base: Fit,
     row: int,
     prediction: _Prediction,
-    quantities: Mapping[str, tuple[str, str, Quantity]],
+    quantities: Quantities,
     rng: np.random.Generator,
 ) -> dict[str, float]:
     """Return the scores of one prediction of one test."""
@@ -285,11 +291,13 @@ def _judge(
             target = quantity(time, truth[signal])
             found[f"crps_{name}"] = _crps(values, target)
             found[f"rmse_{name}"] = float(abs(np.median(values) - target))
+            found[f"coverage_{name}"] = _covers(values, target)
     first = off.size - len(layout.test.scalars)
     for k, scalar in enumerate(layout.test.scalars):
         if np.isfinite(scalar.sd):
             values = draws[:, first + k] * scalar.sd
             found[f"crps_{scalar.name}"] = _crps(values, scalar.value)
+            found[f"coverage_{scalar.name}"] = _covers(values, scalar.value)
             found[f"rmse_{scalar.name}"] = float(abs(off[first + k]) * scalar.sd)
     return found
 
@@ -314,10 +322,16 @@ def _crps(draws: Array, target: float) -> float:
     return float(np.mean(np.abs(ordered - target)) - spread)
 
 
+def _covers(draws: Array, target: float) -> float:
+    """Return 1 if the central interval of a sample covers a value, else 0."""
+    low, high = np.quantile(draws, [0.5 * (1.0 - INTERVAL), 0.5 * (1.0 + INTERVAL)])
+    return float(low <= target <= high)
+
+
 def _compare(
     scored: Scored,
     region: str,
-    quantities: Mapping[str, tuple[str, str, Quantity]],
+    quantities: Quantities,
     rng: np.random.Generator,
 ) -> list[Gain]:
     gains = []
@@ -332,7 +346,9 @@ def _compare(
             Gain(
                 score=score,
                 region=region,
-                unit=quantities[name][0] if name in quantities else "",
+                unit=quantities[name][0]
+                if name in quantities and not score.startswith("coverage")
+                else "",
                 base=base,
                 extended=extended,
                 gaussian_process=process,
@@ -357,11 +373,13 @@ def _better(
     ours: Array, theirs: Array, score: str, rows: NDArray[np.int64], *, relative: bool = False
 ) -> Estimate:
     """Return the improvement of a score with a paired bootstrap interval."""
-    sign = 1.0 if score == "log_score" else -1.0
+    sign = 1.0 if score == "log_score" or score.startswith("coverage") else -1.0
 
     def gain(mine: Array, other: Array) -> Array:
         difference = sign * (_mean(mine, score) - _mean(other, score))
-        return difference / np.abs(_mean(other, score)) if relative else difference
+        return (
+            difference / np.maximum(np.abs(_mean(other, score)), TINY) if relative else difference
+        )
 
     value = float(gain(ours, theirs))
     low, high = np.quantile(gain(ours[rows], theirs[rows]), [0.025, 0.975])

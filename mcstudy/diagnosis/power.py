@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.fit import Fit, FitError, fit, linearise, observe_tests
+from mcstudy.diagnosis.fit import Fit, FitError, fit, observe_tests
 from mcstudy.diagnosis.layout import Layout
 from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import (
@@ -266,6 +266,6 @@ def _distance(problem: Problem, layouts: Sequence[Layout], best: Fit, rival: Fit
     """Return a rival's excess negative log posterior on noise-free data of the best cause."""
     own = tuple(np.zeros(len(layout.names)) for layout in layouts)
     start = Scores(rival.scores.shared, own)
-    if linearise(problem, layouts, rival.forms, start, best.scatter) is None:
+    if observe_tests(problem, rival.forms, layouts, start) is None:
         return float("nan")
     return fit(problem, layouts, rival.forms, start, best.scatter).misfit - best.misfit

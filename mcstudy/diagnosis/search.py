@@ -10,7 +10,6 @@ from mcstudy.diagnosis.layout import Layout, lay_out
 from mcstudy.diagnosis.model_selection import (
     DISTINCT,
     MAX_SHARE,
-    SCAN,
     STRUCTURE,
     Candidate,
     Remainder,
@@ -26,6 +25,7 @@ from mcstudy.diagnosis.screening import (
     score_templates,
     screen,
 )
+from mcstudy.diagnosis.survey import SCAN
 from mcstudy.diagnosis.templates import (
     Template,
     cause_templates,

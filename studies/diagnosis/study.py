@@ -1,6 +1,6 @@
 """Diagnosis of a model against measured tests, from a folder of data to a report."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.gain import Gain, Quantity, measure_gain
-from mcstudy.diagnosis.model_selection import Candidate, with_given_scatter
+from mcstudy.diagnosis.gain import Gain, Quantities, Quantity, measure_gain
+from mcstudy.diagnosis.model_selection import Candidate, settle, with_given_scatter
 from mcstudy.diagnosis.power import minimum_detectable_effects, value_of_information
 from mcstudy.diagnosis.problem import Cause, Problem
 from mcstudy.diagnosis.regions import locate_misfit
@@ -141,7 +141,11 @@ def _write(
     ranges = extension.ranges_of(text, parameters)
     if finding.best is not None:
         say("measuring the gain", quiet=quiet)
-        gains = measure_gain(problem, layouts, finding.base, finding.best, quantities(data), seed)
+        # Both models may take what they get wrong for scatter, so that neither is overconfident.
+        fair = partial(settle, problem, layouts, absorbing=True)
+        gains = measure_gain(
+            problem, layouts, fair(finding.base), fair(finding.best), quantities(data), seed
+        )
         longer = extension.checked(extension.extend(text, parameters))
         folder.write_text(EXTENDED, longer)
         before, after = conclusions.conclude(text), conclusions.conclude(longer)
@@ -207,7 +211,7 @@ def _effect(problem: Problem, candidate: Candidate, finding: Finding) -> dict[st
     }
 
 
-def quantities(data: Measured) -> Mapping[str, tuple[str, str, Quantity]]:
+def quantities(data: Measured) -> Quantities:
     """Return the signal quantities that score predictions: unit, signal, function."""
     found: dict[str, tuple[str, str, Quantity]] = {}
     if "head_acceleration" in data.header.signals:

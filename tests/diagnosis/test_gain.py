@@ -53,7 +53,7 @@ def named(gains: list[Gain], score: str, region: str = "inside") -> Gain:
 
 def test_an_effect_that_is_there_gains_and_one_that_is_not_does_not() -> None:
     gains = measure_gain(*fits(1.0, 11), PEAK, seed=0)
-    for region in ("inside", "beyond"):
+    for region in ("inside", "above", "below"):
         assert named(gains, "log_score", region).difference.low > 0.0
     assert named(gains, "rmse_head_acceleration").difference.low > 0.0
     # The process predicts what the base model misses.

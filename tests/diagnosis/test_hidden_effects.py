@@ -183,11 +183,16 @@ def test_rates_count_what_they_say() -> None:
     found = analyse(outcomes)
     rates = {key: row["value"] for key, row in found["rates"].items()}
     assert rates["false_alarms"] == 0.5
-    assert rates["detection"] == 1.0
-    assert rates["truth_in_set"] == pytest.approx(2.0 / 3.0)
-    assert rates["single_wrong"] == pytest.approx(1.0 / 3.0)
-    assert rates["outside_named"] == 0.5
+    assert rates["false_names"] == 0.5
+    assert rates["own_named"] == pytest.approx(2.0 / 3.0)
+    assert rates["own_single_wrong"] == pytest.approx(1.0 / 3.0)
+    assert "foreign_named" not in rates
+    assert rates["outside_unexplained"] == 0.5
     assert rates["pair_both"] == 1.0
+    # The median of the sizes, all of one class.
+    (power,) = found["power"]
+    assert (power["kind"], power["size"], power["trials"]) == ("own form", 3.0, 3)
+    assert power["named"]["value"] == pytest.approx(2.0 / 3.0)
     assert found["confusion"]["sensor_gain"] == {"sensor_gain": 1, "speed_bias": 1}
     assert found["confusion"]["nothing"] == {"adequate": 1, "sensor_gain": 1}
 
@@ -197,4 +202,6 @@ def test_a_plan_has_every_kind_and_about_the_number_asked_for() -> None:
     assert {t.kind for t in trials} == set(KINDS)
     assert 190 <= len(trials) <= 210
     assert len(set(trials)) == len(trials)
-    assert {target.key for target in TARGETS} >= {"false_alarms", "single_wrong", "pair_both"}
+    foreign = [t for t in trials if t.kind in ("foreign form", "outside")]
+    assert len(foreign) >= 0.45 * len([t for t in trials if t.kind != "none"])
+    assert {target.key for target in TARGETS} >= {"false_alarms", "own_named", "pair_both"}

@@ -90,7 +90,7 @@ def test_the_answer_is_on_disk_with_a_report_that_says_it(gain: Any) -> None:
 def test_the_gain_is_that_of_held_out_tests(gain: Any) -> None:
     _, _, answer = gain
     rows = {(g["score"], g["region"]): g for g in answer["gain"]}
-    for region in ("inside", "beyond"):
+    for region in ("inside", "above"):
         for score in ("crps_hic15", "log_score", "rmse_head_acceleration", "rmse_hic15"):
             row = rows[score, region]
             difference = row["difference"]

@@ -6,16 +6,18 @@ gets, and are compared with its answer afterwards.
 
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcstudy.diagnosis.fit import fit
+from mcstudy.diagnosis.gain import Quantities, measure_gain
 from mcstudy.diagnosis.layout import Scatter
-from mcstudy.diagnosis.model_selection import rescale
+from mcstudy.diagnosis.model_selection import rescale, settle
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.diagnosis.screening import POWER
 from mcstudy.diagnosis.search import UNEXPLAINED, Finding, fit_base, search
@@ -23,7 +25,7 @@ from mcstudy.measurement.measured_data import load_measured
 from studies.diagnosis.causes import causes_of
 from studies.diagnosis.model_choice import choose_model
 from studies.diagnosis.problem import build_problem
-from studies.diagnosis.study import simulation_of
+from studies.diagnosis.study import quantities, simulation_of
 from studies.validation.diagnosis.drawing import draw
 from studies.validation.diagnosis.hidden_effects import make_tests
 from studies.validation.diagnosis.laboratory import Hidden, Laboratory, draw_laboratory
@@ -51,6 +53,26 @@ class Trial:
     kind: str
     force: bool
     usual: bool = True
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Prediction of HIC15 in held-out tests.
+
+    Attributes
+    ----------
+    crps : float
+        Gain in CRPS against the base model, relative.
+    against_process : float
+        The same against a Gaussian-process discrepancy.
+    coverage_base, coverage : float
+        Share of the tests within 90 % intervals, of the base and the extended model.
+    """
+
+    crps: float
+    against_process: float
+    coverage_base: float
+    coverage: float
 
 
 @dataclass(frozen=True)
@@ -85,6 +107,8 @@ class Outcome:
         explain, log units.
     flip_p_value : float
         Of the sign flips.
+    gains : mapping of str to HeldOut
+        By region, where a single effect was named rightly.
     """
 
     trial: Trial
@@ -103,6 +127,7 @@ class Outcome:
     share: float = 1.0
     left: float = 0.0
     flip_p_value: float = 1.0
+    gains: Mapping[str, HeldOut] = field(default_factory=dict)
 
     @property
     def detected(self) -> bool:
@@ -133,6 +158,8 @@ def run_trial(trial: Trial, workers: int = 1) -> Outcome:
         start = time.perf_counter()
         finding = search(problem, causes_of("headform"), workers=workers)
         seconds = time.perf_counter() - start
+        judged = quantities(load_measured(folder))
+        gains = _gains(problem, finding, judged, trial.seed) if _is_right(finding, hidden) else {}
         sizes = [
             _size(Path(scratch) / h.name, h, trial.seed, laboratory, problem, finding)
             for h in hidden
@@ -154,7 +181,32 @@ def run_trial(trial: Trial, workers: int = 1) -> Outcome:
         share=1.0 if finding.remainder is None else finding.remainder.share,
         left=0.0 if finding.remainder is None else finding.remainder.left,
         flip_p_value=finding.screening.flip_p_value,
+        gains=gains,
     )
+
+
+def _is_right(finding: Finding, hidden: Sequence[Hidden]) -> bool:
+    """Return whether the only hidden effect was named, alone."""
+    return len(hidden) == 1 and finding.cause == hidden[0].name and not finding.second
+
+
+def _gains(problem: Problem, finding: Finding, judged: Quantities, seed: int) -> dict[str, HeldOut]:
+    """Return the predictions of HIC15 in held-out tests by region."""
+    assert finding.best is not None
+    fair = partial(settle, problem, finding.layouts, absorbing=True)
+    rows = {
+        (gain.score, gain.region): gain
+        for gain in measure_gain(
+            problem, finding.layouts, fair(finding.base), fair(finding.best), judged, seed
+        )
+    }
+    found = {}
+    for (score, region), gain in rows.items():
+        if score == "crps_hic15":
+            covered = rows["coverage_hic15", region]
+            against = 1.0 - gain.extended / gain.gaussian_process
+            found[region] = HeldOut(gain.relative.value, against, covered.base, covered.extended)
+    return found
 
 
 def _problem(folder: Path) -> Problem:

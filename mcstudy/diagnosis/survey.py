@@ -1,0 +1,214 @@
+"""Survey of a form: where it may start from, what it promises, and a first fit from there."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcstudy.diagnosis.fit import Fit, FitError, Slopes, fit, residuals_at
+from mcstudy.diagnosis.layout import Layout, Scatter
+from mcstudy.diagnosis.linear_model import Centre, solve
+from mcstudy.diagnosis.normal_equations import Scores
+from mcstudy.diagnosis.problem import Form, Problem
+from mcstudy.diagnosis.templates import score_grid
+
+Array = NDArray[np.float64]
+
+SCAN = Scatter(0.02, 0.02)
+"""Repeatability with which the base model is fitted before it is estimated, and the largest with
+which forms are tried."""
+LEAST_SCAN = 0.003
+"""Smallest repeatability with which forms are tried."""
+UNSEEN = 0.05
+"""Whitened sum of squares below which a form changes nothing that was measured."""
+FAR = 0.7
+"""Weight of the data below which a fit starts far from the data."""
+MAX_START = 3.0
+"""Largest latent, in size, that a fit starts from."""
+CLOSE, WORSE = 60.0, 1.4
+"""Log units and factor by which a form far from the data may fit worse than the best."""
+MODEST, SLIGHT = 4.0, 6.0
+"""Factor and log units by which a form near the data may promise less gain than the best."""
+STAGE_STEPS = 6
+"""Steps of a first fit."""
+SURVEYED = 10
+"""Tests on which forms are surveyed: spread over the largest measured values, the upper half of
+them more densely, where clearances, plateaus and saturation begin."""
+DENSER = 0.6
+"""Exponent of the ranks of these tests."""
+
+
+def scan_scatter(base: Fit) -> Scatter:
+    """Return the repeatability with which forms are tried beside a base."""
+    level, shape = (
+        float(np.clip(size, LEAST_SCAN, most))
+        for size, most in ((base.scatter.level, SCAN.level), (base.scatter.shape, SCAN.shape))
+    )
+    return Scatter(level, shape)
+
+
+@dataclass(frozen=True)
+class Survey:
+    """Result of a prior grid scan of a form.
+
+    Attributes
+    ----------
+    form : the form that was scanned.
+    scatter : repeatability of the survey.
+    weight : of the data; the larger the misfit without the form, the smaller.
+    misfit : negative log posterior at the best start, or what the expected gain makes of it.
+    promise : expected gain in log posterior if only the size of the form were free.
+    starts : latents to start from, with nearby Jacobians, best first.
+    """
+
+    form: Form
+    scatter: Scatter
+    weight: float
+    misfit: float
+    promise: float
+    starts: tuple[tuple[Scores, Slopes], ...]
+
+    @property
+    def far(self) -> bool:
+        """Whether a fit starts far from the data."""
+        return self.weight < FAR
+
+
+def survey(
+    problem: Problem,
+    layouts: Sequence[Layout],
+    forms: tuple[Form, ...],
+    centres: Sequence[Centre],
+    scatter: Scatter,
+    form: Form,
+) -> Survey | None:
+    """Return the prior grid scan of a form, nuisances solved for in the linear model.
+
+    None if the form changes nothing that was measured, or cannot run.
+
+    Parameters
+    ----------
+    problem : Problem
+    layouts : sequence of Layout
+        Of the tests.
+    forms : tuple of Form
+        Forms of the model without the one to add.
+    centres : sequence of Centre
+        Points to linearise at: a misfit draws the most probable latents of a wrong model away from
+        those of the right one.
+    scatter : Scatter
+        Repeatability of the survey.
+    form : Form
+        The one to add.
+    """
+    chosen = _spread(layouts)
+    part = replace(problem, tests=tuple(problem.tests[i] for i in chosen))
+    places = [layouts[i] for i in chosen]
+    few = [centre.of_tests(chosen) for centre in centres]
+    times = len(layouts) / len(chosen)
+    samples = sum(r.size for r in few[0].residuals)
+    least = min(solve(centre, centre.residuals, 1.0)[1] for centre in few)
+    weight = min(1.0, float(np.sqrt(0.5 * samples / least)))
+    best: list[tuple[float, Scores, Slopes]] = []
+    changes = 0.0
+    lowest = expected = np.inf
+    for centre, whole in zip(few, centres, strict=True):
+        without = solve(centre, centre.residuals, weight)[1]
+        lowest = min(lowest, without)
+        tried: list[tuple[float, Scores]] = []
+        for scores in score_grid(form, fine=weight < FAR):
+            start = Scores(np.concatenate([centre.scores.shared, scores]), centre.scores.own)
+            residuals = residuals_at(part, places, (*forms, form), start, scatter)
+            if residuals is None:
+                continue
+            for found, before in zip(residuals, centre.residuals, strict=True):
+                changes = max(changes, float(np.sum((found - before) ** 2)))
+            solved, misfit = solve(centre, residuals, weight)
+            halfway = [0.5 * (r + b) for r, b in zip(residuals, centre.residuals, strict=True)]
+            gain = _gain(without, solve(centre, halfway, weight)[1], misfit)
+            expected = min(expected, without - gain)
+            shared = np.clip(solved.shared, -MAX_START, MAX_START)
+            own = list(whole.scores.own)
+            for i, z in zip(chosen, solved.own, strict=True):
+                own[i] = z
+            held = tuple(np.clip(z, -MAX_START, MAX_START) for z in own)
+            cost = misfit + 0.5 * float(scores @ scores) / times
+            tried.append((cost, Scores(np.concatenate([shared, scores]), held)))
+        if tried:
+            best.append((*min(tried, key=lambda entry: entry[0]), whole.slopes))
+    if changes < UNSEEN:
+        return None
+    best.sort(key=lambda entry: entry[0])
+    starts = tuple((start, slopes) for _, start, slopes in best)
+    # Steps of the grid are too large for a small effect in data of little noise.
+    reached = min(best[0][0], expected) if weight >= FAR else best[0][0]
+    promise = max(lowest - expected, 0.0)
+    return Survey(form, scatter, weight, times * reached, times * promise, starts)
+
+
+def _spread(layouts: Sequence[Layout]) -> list[int]:
+    """Return the tests of a survey, in order."""
+    if len(layouts) <= SURVEYED:
+        return list(range(len(layouts)))
+    heights = [
+        max((float(np.abs(s.values).max()) for s in layout.test.signals), default=float(i))
+        for i, layout in enumerate(layouts)
+    ]
+    places = np.linspace(0.0, 1.0, SURVEYED) ** DENSER
+    ranks = np.unique((places * (len(layouts) - 1)).round().astype(int))
+    return sorted(int(i) for i in np.argsort(heights)[ranks])
+
+
+def _gain(none: float, half: float, whole: float) -> float:
+    """Return the drop of a parabola through the loss at none, half and all of a change."""
+    curvature = 2.0 * (none + whole - 2.0 * half)
+    slope = whole - none - curvature
+    return slope**2 / (4.0 * curvature) if slope < 0.0 < curvature else 0.0
+
+
+def may_win(surveyed: Survey, misfit: float, promise: float) -> bool:
+    """Return whether a form may still beat those with the best loss and expected gain."""
+    if surveyed.far:
+        return surveyed.misfit < WORSE * misfit + CLOSE
+    return MODEST * surveyed.promise + SLIGHT > promise
+
+
+def approach(
+    problem: Problem, layouts: Sequence[Layout], forms: tuple[Form, ...], surveyed: Survey
+) -> Fit | None:
+    """Return a first fit of a model extended by one form; None if it cannot run.
+
+    From far away the likelihood is tempered, and less so as the fit comes near.
+
+    Parameters
+    ----------
+    problem : Problem
+    layouts : sequence of Layout
+        Of the tests.
+    forms : tuple of Form
+        Forms of the model without the one to add.
+    surveyed : Survey
+        Prior grid scan of the form to add.
+    """
+    forms = (*forms, surveyed.form)
+    best: Fit | None = None
+    for start, slopes in surveyed.starts:
+        try:
+            for stage in (surveyed.weight, np.sqrt(surveyed.weight)) if surveyed.far else ():
+                found = fit(
+                    problem, layouts, forms, start, surveyed.scatter, slopes,
+                    exact=False, weight=stage, most=STAGE_STEPS,
+                )  # fmt: skip
+                slopes = found.slopes
+                # Nuisances absorbed the misfit of wrong shared values: they are reset.
+                start = Scores(found.scores.shared, tuple(np.zeros_like(z) for z in start.own))
+            found = fit(
+                problem, layouts, forms, start, surveyed.scatter, slopes,
+                exact=False, most=STAGE_STEPS,
+            )  # fmt: skip
+        except FitError:
+            continue
+        if best is None or found.log_evidence > best.log_evidence:
+            best = found
+    return best

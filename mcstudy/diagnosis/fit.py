@@ -18,11 +18,17 @@ from mcstudy.studyfile.input_space import MAX_SCORE, value_at
 
 Array = NDArray[np.float64]
 
-SHARED_STEP, OWN_STEP = 0.1, 0.5
+SHARED_STEP, OWN_STEP = 0.05, 0.5
 """Steps of finite differences, in latents: of shared values and of a test's own nuisances."""
+CHANGE, STEP_RANGE = 30.0, (0.01, 0.3)
+"""Norm of the whitened change of the data over which a shared value is differentiated once its
+column is known, and bounds of the step."""
 MAX_STEPS = 12
 CONVERGED = 0.05
 """Expected gain in log posterior below which a fit has converged."""
+NEAR, MIN_SLIDE = 2.0, 0.3
+"""Expected gain below which confounded values are moved along each other, and the least gain in log
+prior that is worth it."""
 LINEAR = 0.7
 """Achieved share of the expected gain above which the Jacobian is reused."""
 LONGEST = 1.5
@@ -199,18 +205,35 @@ def fit(
     if seen is None:
         raise FitError("a run fails at the start of the fit")
     misfit = _misfit(layouts, seen, scores, scatter, weight)
-    slopes, fresh, simulated = known, False, known is None
+    slopes, fresh, simulated, stuck = known, False, known is None, False
+    latest: Slopes | None = None
     if known is not None and known.shared[0].shape[1] < scores.shared.size:
         slopes = simulate_slopes(problem, forms, layouts, scores, seen, scatter, known)
     for step in range(most + 1):
         if slopes is None:
-            slopes = simulate_slopes(problem, forms, layouts, scores, seen, scatter)
+            slopes = simulate_slopes(
+                problem, forms, layouts, scores, seen, scatter, sizes=_sizes(latest)
+            )
             fresh = simulated = True
+        latest = slopes
         residuals, own = expand_tests(layouts, seen, scores, slopes, scatter)
         system = NormalEquations(own, slopes.shared, weight)
         planned = system.solve(residuals, scores)
         last = step == most
         better = None
+        if planned.expected_gain < NEAR and not (last or stuck):
+            # Finite differences hide the directions that change no data.
+            slide = system.slide(scores)
+            stuck = slide.expected_gain < MIN_SLIDE
+            if not stuck:
+                better = _descend(
+                    problem, forms, layouts, scores, slide.move, scatter, misfit, weight
+                )
+                stuck = better is None or misfit - better[2] < CONVERGED
+            if better is not None:
+                scores, seen, misfit = better
+                fresh = False
+                continue
         promising = planned.expected_gain >= CONVERGED
         if promising and not last:
             better = _descend(
@@ -317,8 +340,13 @@ def simulate_slopes(
     seen: Sequence[Observation],
     scatter: Scatter,
     known: Slopes | None = None,
+    *,
+    sizes: Array | None = None,
 ) -> Slopes:
-    """Return the Jacobian blocks that take runs, by one-sided differences to a side that runs.
+    """Return the Jacobian blocks that take runs, by finite differences.
+
+    They are central in the shared latents: one-sided ones would give confounded values, which
+    change the same data, a difference that is not there.
 
     Parameters
     ----------
@@ -332,6 +360,9 @@ def simulate_slopes(
     scatter : Scatter
     known : Slopes, optional
         Blocks that are kept; missing shared columns come last.
+    sizes : (p,) array, optional
+        Norms of the shared columns, as far as known: the differences are taken over changes of the
+        data of one size, so that confounded values err alike.
     """
     residuals = [
         layout.residual(observation, own, scatter)
@@ -351,15 +382,31 @@ def simulate_slopes(
         for table, kept in zip(shared, known.shared, strict=True):
             table[:, :there_already] = kept
     for k in range(there_already, scores.shared.size):
-        for step in (SHARED_STEP, -SHARED_STEP):
+        size = SHARED_STEP
+        if sizes is not None and sizes[k] > 0.0:
+            size = float(np.clip(CHANGE / sizes[k], *STEP_RANGE))
+        ends = []
+        for step in (size, -size):
             moved_shared = scores.shared.copy()
             moved_shared[k] += step
             found = residuals_at(problem, layouts, forms, Scores(moved_shared, scores.own), scatter)
             if found is not None:
-                for table, residual, other in zip(shared, residuals, found, strict=True):
-                    table[:, k] = (residual - other) / step
-                break
+                ends.append((step, found))
+        if not ends:
+            continue
+        # Central, or one-sided where one side does not run.
+        (high, above), (low, below) = ends if len(ends) == 2 else (ends[0], (0.0, residuals))
+        for table, upper, lower in zip(shared, above, below, strict=True):
+            table[:, k] = (lower - upper) / (high - low)
     return Slopes(tuple(doubtful), tuple(shared))
+
+
+def _sizes(slopes: Slopes | None) -> Array | None:
+    """Return the norms (p,) of the shared columns of a Jacobian."""
+    if slopes is None:
+        return None
+    squares = np.sum([np.sum(table**2, axis=0) for table in slopes.shared], axis=0)
+    return np.asarray(np.sqrt(squares))
 
 
 def _doubtful(

@@ -187,6 +187,14 @@ def rank_causes(
     promising = [
         s for k, s in enumerate(seen[:most]) if k < MIN_COUNT or may_win(s, seen[0].misfit, best)
     ]
+    # Far from the data one form of a cause may start badly and end best.
+    chosen = {s.form.cause for s in promising}
+    held = {(s.form.cause, s.form.name) for s in promising}
+    promising += [
+        s
+        for s in seen
+        if s.far and s.form.cause in chosen and (s.form.cause, s.form.name) not in held
+    ]
     first = run_jobs(partial(approach, problem, layouts, base.forms), promising, workers)
     reached = [found for found in first if found is not None]
     least = min((found.misfit for found in reached), default=0.0)

@@ -8,6 +8,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+FLAT = 1e-3
+"""Information in a direction of the shared latents, over the largest one, below which the direction
+counts as unknown to the data."""
+
 
 @dataclass(frozen=True)
 class Scores:
@@ -67,6 +71,25 @@ class NormalEquations:
             self._crosses.append(cross)
         if p:
             self.log_determinant += float(np.linalg.slogdet(self.schur)[1])
+
+    def slide(self, scores: Scores) -> Step:
+        """Return the move of the shared latents to the most probable ones that fit as well.
+
+        Only directions are taken in which the data know a thousandth of the best known one, as
+        where a mass and a force scale change the same acceleration.
+
+        Parameters
+        ----------
+        scores : Scores
+            Latents of the fit.
+        """
+        still = tuple(np.zeros_like(z) for z in scores.own)
+        move = np.zeros_like(scores.shared)
+        if move.size > 1:
+            values, vectors = np.linalg.eigh(self.schur - np.eye(move.size))
+            flat = vectors[:, values < FLAT * values[-1]]
+            move = -flat @ (flat.T @ scores.shared)
+        return Step(Scores(move, still), 0.5 * float(move @ move))
 
     def solve(self, residuals: Sequence[Array], scores: Scores) -> Step:
         """Return the move to the most probable latents of the linear model.

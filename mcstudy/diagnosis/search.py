@@ -19,6 +19,7 @@ from mcstudy.diagnosis.model_selection import (
 )
 from mcstudy.diagnosis.problem import Cause, Problem
 from mcstudy.diagnosis.screening import (
+    LEVEL,
     Screening,
     estimate_scatter,
     is_at_bound,
@@ -205,7 +206,8 @@ def _judge(
                 why="the model explains the data within its uncertainty, although residuals have "
                 "the same sign in more tests than by chance: no cause gains from it",
             )  # fmt: skip
-        return replace(nothing, why="no cause of the catalogue explains the misfit")
+        reason = _conflict(problem, empty) or "no cause of the catalogue explains the misfit"
+        return replace(nothing, why=reason)
     best = candidates[0]
     left = examine(problem, empty.layouts, best.fitted, best.log_evidence)
     drift, evidence = empty.screening.drift
@@ -258,6 +260,21 @@ def _judge(
     if left.share >= MAX_SHARE:
         return flagged
     return replace(nothing, remainder=left, why="structure remains beside the best cause")
+
+
+def _conflict(problem: Problem, found: Finding) -> str:
+    """Return a sentence on the unknown that fits only far out in its prior; empty if there is none.
+
+    Values that change the same data, as a mass and a force scale do, cannot be told apart then.
+    """
+    if found.screening.statistics[-1].p_value > LEVEL:
+        return ""
+    scores = found.base.scores.shared[: len(problem.unknowns)]
+    k = int(np.argmax(np.abs(scores)))
+    return (
+        f"{problem.unknowns[k].name} fits only {abs(scores[k]):.1f} standard deviations out in its "
+        "prior: it, or a recorded value that acts like it, is wrong"
+    )
 
 
 def _trace(

@@ -108,8 +108,12 @@ def survey(
     few = [centre.of_tests(chosen) for centre in centres]
     times = len(layouts) / len(chosen)
     samples = sum(r.size for r in few[0].residuals)
-    least = min(solve(centre, centre.residuals, 1.0)[1] for centre in few)
-    weight = min(1.0, float(np.sqrt(0.5 * samples / least)))
+    misfits = [solve(centre, centre.residuals, 1.0)[1] for centre in few]
+    weight = min(1.0, float(np.sqrt(0.5 * samples / min(misfits))))
+    if weight >= FAR:
+        # Near the data the better of the points is enough.
+        k = int(np.argmin(misfits))
+        few, centres = [few[k]], [centres[k]]
     best: list[tuple[float, Scores, Slopes]] = []
     changes = 0.0
     lowest = expected = np.inf

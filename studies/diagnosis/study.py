@@ -14,6 +14,7 @@ from mcstudy.diagnosis.model_selection import Candidate, settle, with_given_scat
 from mcstudy.diagnosis.power import minimum_detectable_effects, value_of_information
 from mcstudy.diagnosis.problem import Cause, Problem
 from mcstudy.diagnosis.regions import locate_misfit
+from mcstudy.diagnosis.screening import is_at_bound
 from mcstudy.diagnosis.search import Finding, search
 from mcstudy.errors import UserError
 from mcstudy.execution.progress import say
@@ -165,6 +166,11 @@ def _write(
         },
         "cause": finding.cause,
         "ambiguous": list(finding.ambiguous),
+        "scatter": {
+            "level": believed.scatter.level,
+            "shape": believed.scatter.shape,
+            "at_bound": is_at_bound(believed.scatter),
+        },
         "trends": {} if finding.best is None else describe_trends(problem, finding.best),
         "second_cause": None if finding.second is None else finding.second.cause.name,
         "second_ambiguous": list(finding.second_ambiguous),

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mcstudy.diagnosis.screening import FLIP_LEVEL
 from mcstudy.figures.style import words
 from mcstudy.statistics import Estimate
 from mcstudy.text import capital, interval, number, percent, quantity, unit
@@ -91,17 +92,24 @@ def answer(found: Mapping[str, Any]) -> list[str]:
     p = probability(found["p_value"])
     tests = found["data"]["tests"]
     if found["adequate"]:
-        return [
+        lines = [
             f"The model explains the {tests} tests within their uncertainty ({p}). The minimum "
             "detectable effects follow."
         ]
+        if found["flip_p_value"] <= FLIP_LEVEL:
+            lines.append(
+                "Residuals have the same sign in more tests than by chance "
+                f"({probability(found['flip_p_value'])}), but no cause of the catalogue gains from "
+                "it: what is common lies within the uncertainty of each test."
+            )
+        return lines
     lines = [f"The model does not explain the {tests} tests ({p})."]
     titles = found["titles"]
     if found["cause"] == "unexplained":
         lines.append(f"No cause of the catalogue explains it: {found['why']}.")
         if found["drift"]["log_evidence"] > 3.0:
             lines.append(f"Check for a drift: {_drift(found['drift']['name'])}.")
-        return lines
+        return lines + _bound_words(found)
     parameters = found["parameters"]
     lines += [sentence(cause, rows, titles[cause]) for cause, rows in parameters.items()]
     lines += [trend_words(row) for row in found["trends"].values()]
@@ -116,7 +124,17 @@ def answer(found: Mapping[str, Any]) -> list[str]:
         lines.append(f"The second cause is indistinguishable from: {'; '.join(names)}.")
     if found["flagged"]:
         lines.append("A misfit remains that these causes do not explain.")
-    return lines
+    return lines + _bound_words(found)
+
+
+def _bound_words(found: Mapping[str, Any]) -> list[str]:
+    """Return a sentence on a repeatability at its upper bound, if it is there."""
+    if not found["scatter"]["at_bound"]:
+        return []
+    return [
+        "The repeatability from test to test reached its upper bound of 20 %: tests of one set-up "
+        "do not repeat, or the model is wrong in a way that differs from test to test."
+    ]
 
 
 def trend_words(row: Mapping[str, Any]) -> str:

@@ -108,7 +108,7 @@ def test_a_few_tests_name_what_is_hidden_among_few_causes_and_nothing_else(
     where = "studies.validation.diagnosis.trial"
     few = [c for c in causes_of("headform") if c.name in ("hood_bottoming", "sensor_offset")]
     monkeypatch.setattr(f"{where}.Laboratory", partial(Laboratory, tests=6))
-    monkeypatch.setattr(f"{where}.causes_of", lambda _: few)
+    monkeypatch.setattr(f"{where}.causes_of", lambda *_: few)
     outcome = trial(hidden, 21, monkeypatch)
     names = (cause,) if hidden == [BOTTOMING] else ()
     assert (outcome.cause, outcome.named, outcome.second) == (cause, names, None)

@@ -36,7 +36,7 @@ Change = Callable[[Path], None]
 @contextlib.contextmanager
 def few_causes() -> Iterator[None]:
     few = [cause for cause in causes_of("headform") if cause.name in FEW]
-    with mock.patch.object(diagnosis, "causes_of", lambda _: few):
+    with mock.patch.object(diagnosis, "causes_of", lambda *_: few):
         yield
 
 

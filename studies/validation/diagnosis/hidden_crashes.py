@@ -99,12 +99,18 @@ def make_crashes(
 def _curve(hidden: Sequence[Hidden]) -> list[list[float]]:
     """Return the hood's loading curve as it truly is."""
     x, force = np.array(HOOD).T
-    depth = np.unique(np.concatenate([x, np.linspace(0.005, 0.1, 12)]))
+    bottom, plateau = find(hidden, "hood_bottoming"), find(hidden, "hood_yield")
+    more: Sequence[float] | Array = (
+        [] if bottom is None else bottom.numbers["clearance"] + np.array([0.0, 0.006, 0.015])
+    )
+    if plateau is not None:
+        more = [float(np.interp(plateau.numbers["force"], force, x))]
+    depth = np.unique(np.concatenate([x, more]))
     true = np.interp(depth, x, force)
-    if (h := find(hidden, "hood_bottoming")) is not None:
-        beyond = np.maximum(0.0, depth - h.numbers["clearance"])
-        true = true + h.numbers["stiffness"] * beyond**1.5 / 0.1
-    if (h := find(hidden, "hood_yield")) is not None:
+    if bottom is not None:
+        beyond = np.maximum(0.0, depth - bottom.numbers["clearance"])
+        true = true + bottom.numbers["stiffness"] * beyond**1.5 / 0.1
+    if (h := plateau) is not None:
         above = np.maximum(0.0, true - h.numbers["force"])
         true = true - (1.0 - h.numbers["remaining"]) * above
     knots: list[list[float]] = np.stack([depth, true], axis=1).tolist()

@@ -49,6 +49,8 @@ SINGLES, SECONDS = 30, 12
 FAINT_SHARE = 0.003
 """Share of the first cause's log evidence that a second one must add: even the best form of a
 large effect leaves a small residual."""
+HOPELESS = 0.3
+"""Share of the misfit that the first cause must explain for a second one to be sought."""
 NOTABLE = 0.1
 """The same where the residuals of both causes have structure."""
 NEARLY_ALL = 0.99
@@ -233,8 +235,10 @@ def _judge(
         and not _trace(problem, causes, empty.layouts, best.fitted)
     ):
         return alone
-    tell(f"looking for a second cause beside {best.cause.name}")
-    found = _best_pair(problem, causes, empty, candidates, left, workers)
+    found = None
+    if left.share >= HOPELESS:
+        tell(f"looking for a second cause beside {best.cause.name}")
+        found = _best_pair(problem, causes, empty, candidates, left, workers)
     if found is not None:
         pair, rest, firsts = found
         explained = rest.p_value >= STRUCTURE

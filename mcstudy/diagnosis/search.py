@@ -42,13 +42,18 @@ from mcstudy.studyfile.input_space import value_at
 WIDENING = 2.0
 """Log units of evidence for each of misfit that remains within which causes are indistinguishable
 (calibrated on hidden sets of foreign forms)."""
+DOUBTFUL = 0.1
+"""p-value of the remaining structure below which it counts in the naming."""
 SECOND = 6.0
 """Log evidence that a second cause must add."""
 SINGLES, SECONDS = 30, 12
 """Forms that are refitted, as a single cause and as a second one."""
 FAINT_SHARE = 0.003
-"""Share of the first cause's log evidence that a second one must add: even the best form of a
-large effect leaves a small residual."""
+"""Share of the first cause's log evidence that a second one must add where the residuals of the
+first pass the general test: even the best form of a large effect leaves a small residual."""
+ENOUGH = 0.8
+"""Share of what a free discrepancy would explain beside the first cause that a second one must add
+where they do not."""
 HOPELESS = 0.3
 """Share of the misfit that the first cause must explain for a second one to be sought."""
 NOTABLE = 0.1
@@ -212,6 +217,7 @@ def _judge(
         return replace(nothing, why=reason)
     best = candidates[0]
     left = examine(problem, empty.layouts, best.fitted, best.log_evidence)
+    doubt = left.left if left.p_value < DOUBTFUL else 0.0
     drift, evidence = empty.screening.drift
     if evidence > best.log_evidence + DISTINCT and left.p_value < STRUCTURE:
         return replace(nothing, remainder=left, why=f"a slow change explains more: {drift}")
@@ -219,7 +225,7 @@ def _judge(
         nothing,
         remainder=left,
         cause=best.cause.name,
-        ambiguous=_near(candidates, left.left),
+        ambiguous=_near(candidates, doubt),
         best=best.fitted,
         why="one cause explains the misfit",
     )
@@ -227,7 +233,7 @@ def _judge(
     flagged = replace(
         alone, flagged=True, why="one cause explains most of the misfit; structure remains"
     )
-    little = best.log_evidence < WIDENING * left.left
+    little = best.log_evidence < WIDENING * doubt
     if (
         clean
         and not little
@@ -336,8 +342,7 @@ def _best_pair(
     Parameters
     ----------
     alone : Remainder
-        Remaining structure of the first cause alone. A second cause must add at least what a free
-        discrepancy would explain of it.
+        Remaining structure of the first cause alone.
     """
     pairs: list[_Pair] = []
     for first in candidates[:PAIRS]:
@@ -354,7 +359,8 @@ def _best_pair(
     added, sole = best.seconds[0].log_evidence, best.first.log_evidence
     left = examine(problem, empty.layouts, best.seconds[0].fitted, sole + added)
     if left.p_value >= STRUCTURE:
-        enough = added >= max(SECOND, FAINT_SHARE * sole, alone.left)
+        small = FAINT_SHARE * sole if alone.p_value >= STRUCTURE else ENOUGH * alone.left
+        enough = added >= max(SECOND, small)
     else:
         enough = left.share >= NEARLY_ALL and added >= NOTABLE * sole
     if not enough:

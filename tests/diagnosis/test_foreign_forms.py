@@ -1,0 +1,71 @@
+"""Effects in forms and sizes that the catalogue does not have; the full tier: ``validate``."""
+
+from pathlib import Path
+
+import pytest
+
+from mcstudy.diagnosis.search import Finding, search
+from mcstudy.measurement.measured_data import load_measured
+from studies.diagnosis.causes import causes_of
+from studies.diagnosis.model_choice import choose_model
+from studies.diagnosis.problem import build_problem
+from studies.diagnosis.study import simulation_of
+from studies.validation.diagnosis.hidden_effects import make_tests
+from studies.validation.diagnosis.laboratory import Hidden, Laboratory
+
+GAIN = Hidden("sensor_gain", "catalogue", {"factor": 1.12})
+RAMPED = Hidden("rate_dependent_hood", "ramped", {"damping": 100.0, "ramp": 0.005})
+SPRUNG = Hidden("hood_inertia", "local_spring", {"mass": 0.3, "spring": 3e6, "loss": 0.1})
+LIGHT = Hidden("mass_error", "catalogue", {"factor": 0.78})
+BOTTOMING = Hidden("hood_bottoming", "soft_start",
+                   {"clearance": 0.028, "stiffness": 3e5, "layer": 0.005})  # fmt: skip
+WARMING = Hidden("sensor_gain", "warming", {"change": 0.05})
+RINGING = Hidden("ringing", "", {"share": 0.08, "length": 0.012})
+CABLE = Hidden("cable", "", {"size": 2.0})
+CLIPPED = Hidden("sensor_saturation", "catalogue", {"limit": 100.0})
+
+
+def find(folder: Path, hidden: list[Hidden], names: tuple[str, ...], seed: int = 7) -> Finding:
+    make_tests(folder, hidden, seed, Laboratory(tests=9))
+    data = load_measured(folder)
+    choice = choose_model(data, None)
+    problem = build_problem(data, choice, simulation_of(data, choice))
+    causes = [c for c in causes_of("headform") if c.name in names]
+    return search(problem, causes)
+
+
+@pytest.mark.parametrize(
+    ("hidden", "rivals", "named"),
+    [
+        (GAIN, ("speed_bias",), {"sensor_gain"}),
+        (RAMPED, ("hood_inertia",), {"rate_dependent_hood"}),
+        (SPRUNG, ("rate_dependent_hood",), {"hood_inertia"}),
+        # Without a load cell the same pulses: a set, not a name.
+        (LIGHT, ("hood_force_scale", "sensor_gain"), {"mass_error", "hood_force_scale"}),
+        (BOTTOMING, ("hood_yield",), {"hood_bottoming"}),
+        (WARMING, ("hood_force_scale", "speed_bias"), {"sensor_gain"}),
+        (CLIPPED, ("hood_yield",), {"sensor_saturation"}),
+    ],
+    ids=lambda entry: entry.form if isinstance(entry, Hidden) else None,
+)
+def test_another_form_is_still_the_same_cause(
+    hidden: Hidden, rivals: tuple[str, ...], named: set[str], tmp_path: Path
+) -> None:
+    found = find(tmp_path / "tests", [hidden], (hidden.name, *rivals))
+    assert set(found.ambiguous or (found.cause,)) == named
+    assert found.second is None
+
+
+@pytest.mark.parametrize("hidden", [RINGING, CABLE], ids=lambda h: h.name)
+def test_what_no_cause_explains_is_not_named(hidden: Hidden, tmp_path: Path) -> None:
+    found = find(tmp_path / "tests", [hidden], ("sensor_gain", "sensor_filter", "hood_bottoming"))
+    assert found.cause == "unexplained"
+
+
+def test_an_effect_of_all_tests_beside_a_larger_one_is_the_second_cause(tmp_path: Path) -> None:
+    large = Hidden("hood_bottoming", "catalogue", {"clearance": 0.03, "stiffness": 2e5})
+    small = Hidden("sensor_gain", "catalogue", {"factor": 1.08})
+    found = find(tmp_path / "tests", [large, small], ("hood_bottoming", "sensor_gain"))
+    assert found.cause == "hood_bottoming"
+    assert found.second is not None
+    assert found.second.cause.name == "sensor_gain"

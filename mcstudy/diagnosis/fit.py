@@ -212,8 +212,9 @@ def fit(
     for step in range(most + 1):
         if slopes is None:
             slopes = simulate_slopes(
-                problem, forms, layouts, scores, seen, scatter, sizes=_sizes(latest)
-            )
+                problem, forms, layouts, scores, seen, scatter,
+                sizes=_sizes(latest), central=exact,
+            )  # fmt: skip
             fresh = simulated = True
         latest = slopes
         residuals, own = expand_tests(layouts, seen, scores, slopes, scatter)
@@ -342,11 +343,9 @@ def simulate_slopes(
     known: Slopes | None = None,
     *,
     sizes: Array | None = None,
+    central: bool = False,
 ) -> Slopes:
     """Return the Jacobian blocks that take runs, by finite differences.
-
-    They are central in the shared latents: one-sided ones would give confounded values, which
-    change the same data, a difference that is not there.
 
     Parameters
     ----------
@@ -363,6 +362,9 @@ def simulate_slopes(
     sizes : (p,) array, optional
         Norms of the shared columns, as far as known: the differences are taken over changes of the
         data of one size, so that confounded values err alike.
+    central : bool
+        Whether the differences in shared latents are central: one-sided ones give confounded
+        values, which change the same data, a difference that is not there.
     """
     residuals = [
         layout.residual(observation, own, scatter)
@@ -392,9 +394,11 @@ def simulate_slopes(
             found = residuals_at(problem, layouts, forms, Scores(moved_shared, scores.own), scatter)
             if found is not None:
                 ends.append((step, found))
+                if not central:
+                    break
         if not ends:
             continue
-        # Central, or one-sided where one side does not run.
+        # One-sided where the other side does not run.
         (high, above), (low, below) = ends if len(ends) == 2 else (ends[0], (0.0, residuals))
         for table, upper, lower in zip(shared, above, below, strict=True):
             table[:, k] = (lower - upper) / (high - low)

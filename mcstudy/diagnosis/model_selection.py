@@ -38,6 +38,11 @@ MAX_SHARE = 0.8
 """Explained share of the misfit above which a cause is named despite remaining structure."""
 PRUNING_RATIO = 1.5
 """Factor on the best negative log posterior beyond which a form is pruned."""
+FAR_BEHIND, HALF = 200.0, 0.5
+"""Log units, and share of what the best form gains, by which a form may lie behind it before all
+are compared at one repeatability."""
+MAX_CAUSES = 5
+"""Causes, far from the data, of which all forms are fitted."""
 MIN_COUNT = 6
 """Forms that are refitted whatever their expected gain."""
 
@@ -188,7 +193,7 @@ def rank_causes(
         s for k, s in enumerate(seen[:most]) if k < MIN_COUNT or may_win(s, seen[0].misfit, best)
     ]
     # Far from the data one form of a cause may start badly and end best.
-    chosen = {s.form.cause for s in promising}
+    chosen = list(dict.fromkeys(s.form.cause for s in promising))[:MAX_CAUSES]
     held = {(s.form.cause, s.form.name) for s in promising}
     promising += [
         s
@@ -201,9 +206,11 @@ def rank_causes(
     # Forms far behind the best are pruned before their repeatability is re-estimated.
     kept = [found for found in reached if found.misfit < PRUNING_RATIO * least + CLOSE]
     settled = run_jobs(partial(settle, problem, layouts), kept, workers)
-    scatter = max([base, *settled], key=lambda fitted: fitted.log_evidence).scatter
-    refit = partial(with_given_scatter, problem, layouts, scatter, exact=True)
-    base, *fits = run_jobs(refit, [base, *settled], workers)
+    top = max([base, *settled], key=lambda fitted: fitted.log_evidence)
+    behind = max(FAR_BEHIND, HALF * (top.log_evidence - base.log_evidence))
+    ahead = [found for found in settled if found.log_evidence > top.log_evidence - behind]
+    refit = partial(with_given_scatter, problem, layouts, top.scatter, exact=True)
+    base, *fits = run_jobs(refit, [base, *ahead], workers)
     candidates = []
     for cause in causes:
         own_fits = [

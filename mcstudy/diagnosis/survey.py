@@ -30,6 +30,8 @@ CLOSE, WORSE = 60.0, 1.4
 """Log units and factor by which a form far from the data may fit worse than the best."""
 MODEST, SLIGHT = 4.0, 6.0
 """Factor and log units by which a form near the data may promise less gain than the best."""
+RIVAL_START = 1.5
+"""Factor on the misfit of the best start within which another one is tried too."""
 STAGE_STEPS = 6
 """Steps of a first fit."""
 SURVEYED = 10
@@ -144,7 +146,9 @@ def survey(
     if changes < UNSEEN:
         return None
     best.sort(key=lambda entry: entry[0])
-    starts = tuple((start, slopes) for _, start, slopes in best)
+    starts = tuple(
+        (start, slopes) for cost, start, slopes in best if cost < RIVAL_START * best[0][0]
+    )
     # Steps of the grid are too large for a small effect in data of little noise.
     reached = min(best[0][0], expected) if weight >= FAR else best[0][0]
     promise = max(lowest - expected, 0.0)

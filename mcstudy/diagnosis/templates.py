@@ -71,7 +71,7 @@ def score_grid(form: Form, *, fine: bool = False) -> list[Array]:
         moved = form.trend.parameter
         return [
             np.array([level if k == moved else 0.0 for k in range(count - 1)] + [change])
-            for level in (FINE if fine else LEVELS)
+            for level in (FINE[::4] if fine else LEVELS)
             for change in CHANGES
         ]
     if not form.named and count > STANDARD_GRID:
@@ -87,7 +87,7 @@ def score_grid(form: Form, *, fine: bool = False) -> list[Array]:
     first: Sequence[float] = FINE if fine else MORE_PARAMETERS
     others: Sequence[float] = BESIDE_FINE if fine else MORE_PARAMETERS
     axes = [first] + [others] * (min(count, STANDARD_GRID) - 1)
-    axes = [*axes[:2], *(BESIDE_FINE for _ in axes[2:])]
+    axes = [*axes[:2], *((0.0,) if fine else BESIDE_FINE for _ in axes[2:])]
     axes += [(0.0,)] * (count - STANDARD_GRID)
     return [np.array(z) for z in np.stack(np.meshgrid(*axes), -1).reshape(-1, count)]
 

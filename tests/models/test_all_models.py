@@ -36,7 +36,7 @@ ENDS: dict[str, list[tuple[str, dict[str, float]]]] = {
     ],
     "planar": [("impossible_body", {"body_mass": 9.5, "head_mass": 6.0})],
 }  # fmt: skip
-LARGE = {"wet_road": 8.0, "sensor_saturation": 60.0}
+LARGE = {"wet_road": 8.0, "sensor_saturation": 60.0, "hood_bottoming": 0.03}
 """Where the prior's 90 % is no large effect: the size that is one."""
 EVERY_EFFECT = [(name, effect) for name in NAMES for effect in effects_of(name)]
 
@@ -198,9 +198,10 @@ def test_an_effect_is_inputs_more_and_none_of_it_is_nothing(name: str, effect: s
     entry, plain = load_effect(effect), MODELS[name]
     model = load_model(name, {}, {effect: {}})
     added = model.inputs[len(plain.inputs) :]
-    assert [item.name for item in added] == [f"{effect}_{key}" for key in entry.parameters]
+    parameters = {key: p for key, p in entry.parameters.items() if name in p.models}
+    assert [item.name for item in added] == [f"{effect}_{key}" for key in parameters]
     assert all(item.low <= item.nominal <= item.high for item in added)
-    off = {f"{effect}_{key}": parameter.none for key, parameter in entry.parameters.items()}
+    off = {f"{effect}_{key}": parameter.none for key, parameter in parameters.items()}
     without = plain.run({}).outputs
     assert model.run(off).outputs == without
     # Switched on in a study's file or by an input: the same run, and another one than without.

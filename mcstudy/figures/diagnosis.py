@@ -127,7 +127,8 @@ def draw_gain(gains: Sequence[Mapping[str, Any]], labels: Mapping[str, str]) -> 
     shown = [g for g in gains if g["score"] in labels and abs(g["base"]) > MIN_COUNT]
     regions = list(dict.fromkeys(g["region"] for g in shown))
     with style.styled():
-        figure = style.new_figure(8.5, 0.42 * max(len(shown), 3) + 1.2)
+        rows = max(len(shown) // max(len(regions), 1), 3)
+        figure = style.new_figure(2.9 * max(len(regions), 2) + 1.0, 0.42 * rows + 1.5)
         grid = figure.subplots(1, len(regions), squeeze=False, sharey=True)[0]
         for axes, region in zip(grid, regions, strict=True):
             own = [g for g in shown if g["region"] == region]
@@ -143,9 +144,10 @@ def draw_gain(gains: Sequence[Mapping[str, Any]], labels: Mapping[str, str]) -> 
             axes.invert_yaxis()
             axes.axvline(0.0, color="black", linewidth=0.8)
             axes.xaxis.set_major_locator(MaxNLocator(5))
-            axes.set(xlabel="improvement over the base model [%]",
-                     title=f"{region} the speeds used")  # fmt: skip
-            axes.legend(fontsize=8, loc="best")
+            axes.set_title(f"{region} the speeds used")
+        figure.supxlabel("improvement over the base model [%]", fontsize="medium")
+        handles, names = grid[0].get_legend_handles_labels()
+        figure.legend(handles, names, fontsize=8, loc="outside upper right", ncols=2)
         return figure
 
 

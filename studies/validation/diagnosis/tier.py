@@ -11,6 +11,7 @@ import numpy as np
 from mcstudy.execution.progress import follow
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import run_jobs
+from mcstudy.figures import style
 from mcstudy.figures.panels import Curve, Panel, draw_panels
 from mcstudy.report import Section, Table
 from mcstudy.statistics import Estimate, probability
@@ -234,18 +235,18 @@ def _draw(analysis: Mapping[str, Any]) -> dict[str, Any]:
     label = "size over the minimum detectable (80 % power) [–]"
     for key in ("detected", "named"):
         curves = []
-        for kind in ("own form", "foreign form"):
+        for kind, colour in (("own form", style.BLUE), ("foreign form", style.RED)):
             rows = [row for row in analysis["power"] if row["kind"] == kind]
             if rows:
                 size = np.array([row["size"] for row in rows])
                 share = np.array([row[key]["value"] for row in rows])
-                curves.append(Curve(size, share, kind, marker="o"))
+                curves.append(Curve(size, share, kind, colour=colour, marker="o"))
         if curves:
             panels.append(
                 Panel(label, f"share {key} [–]", curves, xlim=(0.0, 20.0), ylim=(0.0, 1.02),
                       legend="lower right")
             )  # fmt: skip
-    return {"power": draw_panels(panels, width=9.0, height=4.0)} if panels else {}
+    return {"power": draw_panels(panels)} if panels else {}
 
 
 def summarise(analysis: Mapping[str, Any]) -> list[Table]:

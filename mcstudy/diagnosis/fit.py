@@ -5,7 +5,7 @@ every test's own nuisances; the Jacobian is block-arrow, so tests are eliminated
 evidence is Laplace's approximation.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,6 +95,14 @@ def shared_names(problem: Problem, forms: Sequence[Form]) -> list[str]:
     ]
 
 
+def form_latents(problem: Problem, forms: Sequence[Form]) -> Iterator[tuple[Form, slice]]:
+    """Yield each form and the places of its latents among the shared ones."""
+    first = len(problem.unknowns)
+    for form in forms:
+        yield form, slice(first, first + form.size)
+        first += form.size
+
+
 @dataclass(frozen=True)
 class _Common:
     """Values that all tests share: unknowns, and parameters of effects by cause.
@@ -115,12 +123,10 @@ def _common(problem: Problem, forms: Sequence[Form], shared: Array) -> _Common:
     }
     effects = {}
     trending = []
-    for form in forms:
-        scores = shared[count : count + form.size]
-        effects[form.cause] = form.values(scores)
+    for form, place in form_latents(problem, forms):
+        effects[form.cause] = form.values(shared[place])
         if form.trend is not None:
-            trending.append((form, scores))
-        count += form.size
+            trending.append((form, shared[place]))
     return _Common(unknowns, effects, tuple(trending))
 
 

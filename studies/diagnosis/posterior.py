@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mcstudy.diagnosis.fit import Fit
+from mcstudy.diagnosis.fit import Fit, form_latents
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.statistics import REACH, Estimate
 from mcstudy.studyfile.input_space import value_at
@@ -22,10 +22,9 @@ def describe(problem: Problem, fitted: Fit) -> dict[str, list[dict[str, Any]]]:
     fitted : Fit
     """
     found: dict[str, list[dict[str, Any]]] = {}
-    k = len(problem.unknowns)
-    for form in fitted.forms:
-        latents = fitted.scores.shared[k : k + form.size]
-        errors = np.sqrt(np.diag(fitted.covariance)[k : k + form.size])
+    for form, place in form_latents(problem, fitted.forms):
+        latents = fitted.scores.shared[place]
+        errors = np.sqrt(np.diag(fitted.covariance)[place])
         if form.trend is not None:
             # Of a single test, the change along the covariate counts as spread.
             errors[form.trend.parameter] = np.hypot(errors[form.trend.parameter], latents[-1])
@@ -50,7 +49,6 @@ def describe(problem: Problem, fitted: Fit) -> dict[str, list[dict[str, Any]]]:
             for name, value in form.fixed.items()
         ]
         found[form.cause] = rows
-        k += form.size
     return found
 
 
@@ -64,10 +62,9 @@ def describe_trends(problem: Problem, fitted: Fit) -> dict[str, dict[str, Any]]:
         Whose forms may have a trend.
     """
     found = {}
-    k = len(problem.unknowns)
-    for form in fitted.forms:
+    for form, place in form_latents(problem, fitted.forms):
         if form.trend is not None:
-            scores = fitted.scores.shared[k : k + form.size]
+            scores = fitted.scores.shared[place]
             parameter = form.free[form.trend.parameter]
             ends = [
                 form.values(scores, chosen(problem.tests, key=form.trend.place))[parameter.name]
@@ -80,5 +77,4 @@ def describe_trends(problem: Problem, fitted: Fit) -> dict[str, dict[str, Any]]:
                 "first": ends[0],
                 "last": ends[1],
             }
-        k += form.size
     return found

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mcstudy.diagnosis.discrepancy import Discrepancy, fit_discrepancy
 from mcstudy.diagnosis.fit import Fit, FitError, Slopes, expand_tests, fit, observe_tests
 from mcstudy.diagnosis.layout import Layout, Scatter
+from mcstudy.diagnosis.model_selection import settle
 from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.diagnosis.screening import estimate_scatter
@@ -94,6 +95,8 @@ def measure_gain(
     seed : int
         Of folds and draws.
     """
+    # Both models may take what they get wrong for scatter, so that neither is overconfident.
+    base, extended = (settle(problem, layouts, f, absorbing=True) for f in (base, extended))
     rng = np.random.default_rng(seed)
     count = len(layouts)
     order = rng.permutation(count)

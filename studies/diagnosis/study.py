@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcstudy.diagnosis.gain import Gain, Quantities, Quantity, measure_gain
-from mcstudy.diagnosis.model_selection import Candidate, settle, with_given_scatter
+from mcstudy.diagnosis.model_selection import Candidate, with_given_scatter
 from mcstudy.diagnosis.power import minimum_detectable_effects, value_of_information
 from mcstudy.diagnosis.problem import Cause, Problem
 from mcstudy.diagnosis.regions import locate_misfit
@@ -142,11 +142,7 @@ def _write(
     ranges = extension.ranges_of(text, parameters)
     if finding.best is not None:
         say("measuring the gain", quiet=quiet)
-        # Both models may take what they get wrong for scatter, so that neither is overconfident.
-        fair = partial(settle, problem, layouts, absorbing=True)
-        gains = measure_gain(
-            problem, layouts, fair(finding.base), fair(finding.best), quantities(data), seed
-        )
+        gains = measure_gain(problem, layouts, finding.base, finding.best, quantities(data), seed)
         longer = extension.checked(extension.extend(text, parameters))
         folder.write_text(EXTENDED, longer)
         before, after = conclusions.conclude(text), conclusions.conclude(longer)

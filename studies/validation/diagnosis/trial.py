@@ -8,7 +8,6 @@ import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 from mcstudy.diagnosis.fit import fit
 from mcstudy.diagnosis.gain import Quantities, measure_gain
 from mcstudy.diagnosis.layout import Scatter
-from mcstudy.diagnosis.model_selection import rescale, settle
+from mcstudy.diagnosis.model_selection import rescale
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.diagnosis.screening import POWER
 from mcstudy.diagnosis.search import UNEXPLAINED, Finding, fit_base, search
@@ -193,12 +192,9 @@ def _is_right(finding: Finding, hidden: Sequence[Hidden]) -> bool:
 def _gains(problem: Problem, finding: Finding, judged: Quantities, seed: int) -> dict[str, HeldOut]:
     """Return the predictions of HIC15 in held-out tests by region."""
     assert finding.best is not None
-    fair = partial(settle, problem, finding.layouts, absorbing=True)
     rows = {
         (gain.score, gain.region): gain
-        for gain in measure_gain(
-            problem, finding.layouts, fair(finding.base), fair(finding.best), judged, seed
-        )
+        for gain in measure_gain(problem, finding.layouts, finding.base, finding.best, judged, seed)
     }
     found = {}
     for (score, region), gain in rows.items():

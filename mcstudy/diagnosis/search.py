@@ -175,7 +175,7 @@ def search(
     tell("fitting the base model")
     layouts, base = fit_base(problem)
     tell("testing its adequacy")
-    bank = tuple(cause_templates(problem, layouts, base, named_forms(causes)))
+    bank = tuple(cause_templates(problem, layouts, base, named_forms(causes), workers))
     screening = screen(
         base,
         layouts,
@@ -238,7 +238,7 @@ def _judge(
         clean
         and not little
         and left.left < STILL
-        and not _trace(problem, causes, empty.layouts, best.fitted)
+        and not _trace(problem, causes, empty.layouts, best.fitted, workers)
     ):
         return alone
     found = None
@@ -288,10 +288,14 @@ def _conflict(problem: Problem, found: Finding) -> str:
 
 
 def _trace(
-    problem: Problem, causes: Sequence[Cause], layouts: Sequence[Layout], fitted: Fit
+    problem: Problem,
+    causes: Sequence[Cause],
+    layouts: Sequence[Layout],
+    fitted: Fit,
+    workers: int,
 ) -> bool:
     """Return whether a template detects a further cause that the general test misses."""
-    bank = cause_templates(problem, layouts, fitted, named_forms(causes))
+    bank = cause_templates(problem, layouts, fitted, named_forms(causes), workers)
     score, information = score_templates(fitted, layouts, bank)
     seen = information > 0.0
     return bool(np.any(np.abs(score[seen]) > FURTHER * np.sqrt(information[seen])))

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from mcstudy.diagnosis.fit import Fit, observe_tests
 from mcstudy.diagnosis.layout import Layout
 from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Cause, Form, Problem
+from mcstudy.execution.workers import run_jobs
 
 Array = NDArray[np.float64]
 
@@ -93,7 +95,11 @@ def score_grid(form: Form, *, fine: bool = False) -> list[Array]:
 
 
 def cause_templates(
-    problem: Problem, layouts: Sequence[Layout], fitted: Fit, forms: Sequence[Form]
+    problem: Problem,
+    layouts: Sequence[Layout],
+    fitted: Fit,
+    forms: Sequence[Form],
+    workers: int = 1,
 ) -> list[Template]:
     """Return the templates of forms about a fit; those whose runs fail are left out.
 
@@ -106,16 +112,24 @@ def cause_templates(
         Fit to expand about.
     forms : sequence of Form
         Forms to add, one at a time.
+    workers : int
+        Processes, -1 for one a core.
     """
     taken = {form.cause for form in fitted.forms}
+    new = [form for form in forms if form.cause not in taken]
+    banks = run_jobs(partial(_templates_of, problem, layouts, fitted), new, workers)
+    return [template for bank in banks for template in bank]
+
+
+def _templates_of(
+    problem: Problem, layouts: Sequence[Layout], fitted: Fit, form: Form
+) -> list[Template]:
+    """Return the templates of one form."""
     found = []
-    for form in forms:
-        if form.cause in taken:
-            continue
-        for scores in score_grid(form):
-            columns = change_of(problem, layouts, fitted, form, scores)
-            if columns is not None and any(np.any(column) for column in columns):
-                found.append(Template(form, scores, columns))
+    for scores in score_grid(form):
+        columns = change_of(problem, layouts, fitted, form, scores)
+        if columns is not None and any(np.any(column) for column in columns):
+            found.append(Template(form, scores, columns))
     return found
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.crash import outcome
+from models.crash.memory import CrashMemory
 from models.crash.record import END_REASONS, Column, Frame, Summary
 from models.crash.scenario import HOOD, Scenario
 from models.crash.tape import Tape, tape_on_zones
@@ -68,6 +69,8 @@ class CrashModel(ABC):
     isomme_device: str
     accidents = True
     cost: float
+    # Whether outputs need nothing but the raw results of their own run.
+    repeatable = True
     partial_status = frozenset({NO_HEAD_CONTACT})
     _own_inputs: tuple[Input, ...]
 
@@ -93,6 +96,7 @@ class CrashModel(ABC):
             self.vehicle = self.vehicle.with_curve(HOOD, hood_curve)
         self.tick = float(tick)
         self._chain = build_chain(self.name, effects)
+        self._memory = CrashMemory(self._chain)
         n, zones = len(SEGMENTS), len(self.vehicle.zones)
         self._record = np.zeros((int(TIME_LIMIT / self.tick) + 2, Column.REGION_FORCE + zones + 1))
         self._frames = np.zeros((int(TIME_LIMIT / FRAME_INTERVAL) + 2, Frame.POSES + 7 * n))
@@ -110,7 +114,8 @@ class CrashModel(ABC):
         ValueError
             If an input is unknown or outside its range.
         """
-        return self._run(complete_inputs(self, inputs), None, None, scene=True)
+        values = complete_inputs(self, inputs)
+        return self._run(values, self._simulate(values), None, None, scene=True)
 
     def observe(
         self,
@@ -134,7 +139,13 @@ class CrashModel(ABC):
         ValueError
             If an input is unknown or outside its range.
         """
-        return self._run(complete_inputs(self, inputs), outputs, channels, scene=False)
+        values = complete_inputs(self, inputs)
+        raw = self._memory.recall(values) if self.repeatable else None
+        if raw is None:
+            raw = self._simulate(values)
+            if self.repeatable:
+                self._memory.keep(values, raw)
+        return self._run(values, raw, outputs, channels, scene=False)
 
     def reached(self) -> float:
         """Return the time (s) that the run under way has reached; 0 for a model of quick runs."""
@@ -183,12 +194,12 @@ class CrashModel(ABC):
     def _run(
         self,
         values: dict[str, float],
+        raw: outcome.Raw | str,
         outputs: Collection[str] | None,
         channels: Collection[str] | None,
         *,
         scene: bool,
     ) -> Run:
-        raw = self._simulate(values)
         if isinstance(raw, str):
             return Run(values, raw, raw, self._empty(outputs))
         signals = outcome.Signals(raw)

@@ -26,6 +26,7 @@ EFFECTS: tuple[str, ...] = (
     "muscle_tone",
     "braced_posture",
     "shoulder_compliance",
+    "friction_level",
     "wet_road",
     "road_slope",
     "restitution",

@@ -101,6 +101,8 @@ class FemModel(FacetModel):
         *_MORE,
     )
     coarse = int(_TABLE["coarse"])
+    # Dents are read from the shells of the latest run.
+    repeatable = False
 
     def __init__(
         self,

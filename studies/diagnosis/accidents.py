@@ -8,7 +8,7 @@ too.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from models.registry import load_model
 from studies.diagnosis.emulator import (
     Change,
     Emulator,
+    Scaling,
     Surface,
     change_terms,
     fit_terms,
@@ -47,8 +48,20 @@ MAX_FAILED = 0.2
 """Maximum share of failed runs."""
 WIDER = 1.5
 """Factor on the recorded uncertainties for the draws, so that the surface reaches beyond them."""
-LOGARITHMIC = ("hic15", "hic36", "ground_hic15", "clip_3ms", "peak_head_acceleration")
+LOGARITHMIC = (
+    "hic15", "hic36", "ground_hic15", "clip_3ms", "peak_head_acceleration", "throw_distance",
+    "wad", "head_impact_time", "car_stopping_distance",
+)  # fmt: skip
 """Outputs whose logarithm is taken, as their scatter grows with their level."""
+OUTLYING = 4.0
+"""Robust standard deviations from the median beyond which an accident is of another kind, e.g. a
+head that struck the bumper: it is left out, in the runs as in the data."""
+ROUNDS = 10
+"""Largest number of fits until the outlying runs stay the same."""
+NORMAL_MAD = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
+TINY = 1e-9
+"""Least standard deviation of an output, for those that never change."""
 AIS = "ais"
 MECHANISM = Mechanism(
     "impact", ((risk_function("nhtsa_lognormal"), 1.0), (risk_function("prasad_mertz"), 1.0))
@@ -71,7 +84,70 @@ def is_collection(data: Measured) -> bool:
     return load_model(data.header.model).accidents and not data.header.signals
 
 
-def build_collection(
+@dataclass(frozen=True)
+class Surfaces:
+    """The crash core over a collection: the emulator, and the scatter of single accidents.
+
+    Scalars of outlying accidents get no weight.
+    """
+
+    emulator: Emulator
+    scatter: Mapping[str, float]
+
+    def problem_of(self, problem: Problem) -> Problem:
+        """Return the problem of accidents on the surfaces.
+
+        Parameters
+        ----------
+        problem : Problem
+            Of the data, with measured scalars as they are.
+        """
+        tests = tuple(_rescaled(test, self.scatter) for test in problem.tests)
+        left_out = self.outlying(problem)
+        tests = tuple(
+            replace(
+                test,
+                scalars=tuple(
+                    replace(scalar, sd=np.inf)
+                    if test.name in left_out.get(scalar.name, ())
+                    else scalar
+                    for scalar in test.scalars
+                ),
+            )
+            for test in tests
+        )
+        return Problem(tests, problem.unknowns, self.emulator, dict(problem.ranges))
+
+    def outlying(self, problem: Problem) -> dict[str, tuple[str, ...]]:
+        """Return the accidents that are left out, by scalar.
+
+        A shift that all accidents share makes none of them outlying.
+
+        Parameters
+        ----------
+        problem : Problem
+            Of the data, with measured scalars as they are.
+        """
+        usual = {unknown.name: _value(unknown, 0.0) for unknown in problem.unknowns}
+        tests = [_rescaled(test, self.scatter) for test in problem.tests]
+        means = [self.emulator({**test.inputs, **usual}, {}) for test in tests]
+        found = {}
+        for k, scalar in enumerate(tests[0].scalars):
+            off = np.array(
+                [
+                    (test.scalars[k].value - mean.scalars[scalar.name]) / test.scalars[k].sd
+                    for test, mean in zip(tests, means, strict=True)
+                    if mean is not None
+                ]
+            )
+            known = np.array([np.isfinite(test.scalars[k].sd) for test in tests])
+            far = known & _is_outlying(np.where(known, off, np.nan))
+            if far.any():
+                found[scalar.name] = tuple(tests[i].name for i in np.flatnonzero(far))
+        return found
+
+
+def fit_surfaces(
     problem: Problem,
     data: Measured,
     choice: ModelChoice,
@@ -80,8 +156,8 @@ def build_collection(
     seed: int,
     workers: int,
     quiet: bool,
-) -> tuple[Problem, Emulator]:
-    """Return the problem of an accident collection, on surfaces of the crash core.
+) -> Surfaces:
+    """Return the surfaces of the crash core over an accident collection.
 
     Parameters
     ----------
@@ -114,24 +190,41 @@ def build_collection(
         raw = _run(choice, {}, draws.columns, POOL)
         base = _outcomes(model, raw, outputs, draws, POOL)
         names = _variables(problem)
-        table = np.stack([draws.columns[name] for name in names], axis=1)
-        centre, scale = table.mean(axis=0), table.std(axis=0)
-        points = (table - centre) / scale
-        coefficients, left = fit_terms(quadratic_terms(points), base)
-        surface = Surface(names, centre, scale, coefficients)
+        scaling = Scaling.of(draws.columns, names)
+        points = scaling.points(draws.columns)
+        coefficients, scatter = _robust_fit(quadratic_terms(points), base)
+        surface = Surface(scaling, coefficients)
         changes = []
         forms = [form for cause in causes for form in cause.forms]
         for k, form in enumerate(follow(forms, "forms of causes", quiet=quiet)):
             change = _change_of(choice, form, draws, base, points, outputs, seed + k, model)
             if change is not None:
                 changes.append(change)
-    scatter = np.sqrt(np.nanmean(left**2, axis=0) * POOL / (POOL - len(coefficients)))
     spread = dict(zip(outputs, scatter.tolist(), strict=True))
     wanted = [_key(name) for name in data.header.scalars]
-    emulator = Emulator(choice.name, outputs, surface, changes, wanted)
-    tests = tuple(_rescaled(test, spread) for test in problem.tests)
-    ranges = dict(problem.ranges)
-    return Problem(tests, problem.unknowns, emulator, ranges), emulator
+    return Surfaces(Emulator(choice.name, outputs, surface, changes, wanted), spread)
+
+
+def _robust_fit(terms: Array, outputs: Array) -> tuple[Array, Array]:
+    """Return coefficients (terms, m) and scatter (m,) of outputs (n, m) without outlying runs."""
+    kept = outputs.copy()
+    for _ in range(ROUNDS):
+        coefficients, left = fit_terms(terms, kept)
+        everything = outputs - terms @ coefficients
+        far = np.stack([_is_outlying(column) for column in everything.T], axis=1)
+        new = np.where(far, np.nan, outputs)
+        if np.array_equal(np.isnan(new), np.isnan(kept)):
+            break
+        kept = new
+    count = np.isfinite(kept).sum(axis=0)
+    return coefficients, np.sqrt(np.nansum(left**2, axis=0) / np.maximum(count - len(terms.T), 1))
+
+
+def _is_outlying(values: Array) -> NDArray[np.bool_]:
+    """Return which values lie far from the median; NaN does not."""
+    off = np.abs(values - np.nanmedian(values))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(off > OUTLYING * max(NORMAL_MAD * float(np.nanmedian(off)), TINY))
 
 
 def _key(name: str) -> str:

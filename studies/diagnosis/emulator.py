@@ -1,6 +1,7 @@
 """The mean outcome of accidents as quadratic surfaces: fast enough for a diagnosis."""
 
 import functools
+import itertools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,23 +15,53 @@ Array = NDArray[np.float64]
 
 RIDGE = 1e-3
 """Ridge penalty on a coefficient, as a share of the runs."""
+CUBIC, MOST_TERMS = 3, 40
+"""Degree of the change by a cause, and the largest number of its terms."""
 GRID = np.linspace(-4.0, 4.0, 161)
 """Standard-normal latents at which a prior's quantile is inverted."""
 
 
 @dataclass(frozen=True)
-class Surface:
-    """A quadratic surface: centre and scale of the variables, coefficients (terms, outputs)."""
+class Scaling:
+    """Variables of a surface: logarithms of those that are always positive, scaled.
+
+    Throw distance goes with a power of the speed: its logarithm is nearly straight over that of the
+    speed, and scatters alike at all speeds.
+
+    Attributes
+    ----------
+    names : of the d variables.
+    logarithmic : (d,) whether the logarithm is taken.
+    centre, scale : (d,) mean and standard deviation.
+    """
 
     names: tuple[str, ...]
+    logarithmic: NDArray[np.bool_]
     centre: Array
     scale: Array
-    coefficients: Array
 
-    def point(self, values: Mapping[str, float]) -> Array:
-        """Return the scaled variables (d,)."""
-        given = np.array([values[name] for name in self.names])
-        return np.asarray((given - self.centre) / self.scale)
+    @classmethod
+    def of(cls, columns: Mapping[str, Array], names: tuple[str, ...]) -> "Scaling":
+        """Return the scaling of variables by their values (n,)."""
+        table = np.stack([columns[name] for name in names], axis=1)
+        logarithmic = table.min(axis=0) > 0.0
+        table[:, logarithmic] = np.log(table[:, logarithmic])
+        return cls(names, logarithmic, table.mean(axis=0), table.std(axis=0))
+
+    def points(self, columns: Mapping[str, Array]) -> Array:
+        """Return the scaled variables (n, d)."""
+        table = np.stack([np.asarray(columns[name], dtype=float) for name in self.names], axis=1)
+        least = np.finfo(float).tiny
+        table[:, self.logarithmic] = np.log(np.maximum(table[:, self.logarithmic], least))
+        return np.asarray((table - self.centre) / self.scale)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A quadratic surface: its variables, and coefficients (terms, outputs)."""
+
+    scaling: Scaling
+    coefficients: Array
 
 
 @dataclass(frozen=True)
@@ -104,13 +135,14 @@ class Emulator:
         self, inputs: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]
     ) -> Observation | None:
         """Return the mean outcome of an accident."""
-        point = self._surface.point(inputs)
-        values = quadratic_terms(point[None])[0] @ self._surface.coefficients
+        given = {name: np.array([inputs[name]]) for name in self._surface.scaling.names}
+        point = self._surface.scaling.points(given)
+        values = quadratic_terms(point)[0] @ self._surface.coefficients
         for cause, parameters in effects.items():
             change = self._change(cause, parameters)
             if change is not None:
                 scores = change.scores(parameters)
-                terms = change_terms(scores[None], point[None], centred=change.centred)
+                terms = change_terms(scores[None], point, centred=change.centred)
                 values = values + terms[0] @ change.coefficients
         by_name = dict(zip(self.outputs, values, strict=True))
         return Observation({}, {name: float(by_name[name]) for name in self._wanted})
@@ -133,6 +165,8 @@ def quadratic_terms(points: Array) -> Array:
 def change_terms(scores: Array, points: Array, *, centred: bool) -> Array:
     """Return the terms of a change: powers of the latents, alone and times the variables.
 
+    Cubic in all of them where these are few terms, else quadratic in the latents.
+
     Parameters
     ----------
     scores : (n, k) array
@@ -142,13 +176,28 @@ def change_terms(scores: Array, points: Array, *, centred: bool) -> Array:
     centred : bool
         Whether the change is zero at latents of zero.
     """
-    n, k = scores.shape
-    columns = [] if centred else [np.ones((n, 1)), points]
-    for j in range(k):
-        z = scores[:, j : j + 1]
-        columns += [z, z**2, z * points]
-    columns += [scores[:, i : i + 1] * scores[:, j : j + 1] for i in range(k) for j in range(i)]
-    return np.concatenate(columns, axis=1)
+    both = np.concatenate([np.ones((len(points), 1)), scores, points], axis=1)
+    places = _change_places(scores.shape[1], points.shape[1], centred)
+    return np.asarray(both[:, places].prod(axis=2))
+
+
+@functools.cache
+def _change_places(k: int, d: int, centred: bool) -> NDArray[np.int64]:
+    """Return the factors of each term (terms, 3): 0 for one, then the latents, the variables."""
+    latents, variables = range(1, k + 1), range(k + 1, k + d + 1)
+    found = [
+        chosen
+        for degree in range(1, CUBIC + 1)
+        for chosen in itertools.combinations_with_replacement((*latents, *variables), degree)
+        if not centred or chosen[0] <= k
+    ]
+    if len(found) > MOST_TERMS:
+        squares = itertools.combinations_with_replacement(latents, 2)
+        found = [*((j,) for j in latents), *squares, *itertools.product(latents, variables)]
+        found += [] if centred else [(j,) for j in variables]
+    if not centred:
+        found.insert(0, ())
+    return np.array([chosen + (0,) * (CUBIC - len(chosen)) for chosen in found])
 
 
 def fit_terms(terms: Array, outputs: Array) -> tuple[Array, Array]:

@@ -51,6 +51,10 @@ class Simulation:
         self._effects = {k: dict(v) for k, v in (effects or {}).items()}
         self._models: dict[tuple[str, ...], Model] = {}
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave the models out: a worker loads its own in milliseconds."""
+        return self.__dict__ | {"_models": {}}
+
     def model(self, effects: Collection[str]) -> Model:
         """Return the model with effects switched on."""
         key = tuple(sorted(effects))

@@ -22,7 +22,7 @@ from mcstudy.execution.results import ResultsFolder
 from mcstudy.measurement.measured_data import Measured, load_measured
 from models.criteria import head_injury_criterion
 from studies.diagnosis import conclusions, extension, pictures
-from studies.diagnosis.accidents import build_collection, is_collection
+from studies.diagnosis.accidents import fit_surfaces, is_collection
 from studies.diagnosis.causes import causes_of, stage_of
 from studies.diagnosis.emulator import Emulator
 from studies.diagnosis.extras import extras_of
@@ -92,15 +92,21 @@ def diagnose(
     causes = tuple(cause for cause in catalogue if cause.name not in choice.effects)
     say(f"{len(problem.tests)} tests, {len(causes)} causes", quiet=quiet)
     source_of_extras: Simulation | Emulator = simulation
+    notes = list(note_lines(data))
     if is_collection(data):
         causes = tuple(c for c in causes if stage_of(c.name) != "signal")
-        problem, source_of_extras = build_collection(
+        surfaces = fit_surfaces(
             problem, data, choice, causes, seed=seed, workers=workers, quiet=quiet
         )
+        for name, accidents in surfaces.outlying(problem).items():
+            notes.append(f"{name} left out as outlying: {', '.join(accidents)}")
+        problem, source_of_extras = surfaces.problem_of(problem), surfaces.emulator
     finding = search(problem, causes, seed=seed, workers=workers, tell=partial(say, quiet=quiet))
     say(finding.why, quiet=quiet)
     with folder.open_for_writing():
-        return _write(data, choice, problem, source_of_extras, causes, finding, folder, seed, quiet)
+        return _write(
+            data, notes, choice, problem, source_of_extras, causes, finding, folder, seed, quiet
+        )  # fmt: skip
 
 
 def simulation_of(data: Measured, choice: ModelChoice) -> Simulation:
@@ -113,6 +119,7 @@ def simulation_of(data: Measured, choice: ModelChoice) -> Simulation:
 
 def _write(
     data: Measured,
+    notes: list[str],
     choice: ModelChoice,
     problem: Problem,
     simulation: Simulation | Emulator,
@@ -152,7 +159,7 @@ def _write(
             "title": data.header.title,
             "tests": len(problem.tests),
             "model": choice.name,
-            "notes": note_lines(data),
+            "notes": notes,
         },
         "adequate": finding.adequate,
         "p_value": finding.screening.p_value,

@@ -34,6 +34,7 @@ SENTENCES = {
     "late_braking": "The car brakes {delay} after first contact.",
     "road_slope": "The road falls by {angle} along the travel.",
     "muscle_tone": "The muscles were tensed: {factor} times the resistance of neck and joints.",
+    "friction_level": "The friction of the road is {factor} times the assumed one.",
     "shoulder_compliance": "The shoulder girdle is {factor} times as compliant.",
     "braced_posture": "The person was braced, {share} of the way.",
     "brake_dive": "The nose dives {angle} more than assumed.",

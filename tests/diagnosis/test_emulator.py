@@ -7,6 +7,7 @@ from linear_tests import BUMP
 from studies.diagnosis.emulator import (
     Change,
     Emulator,
+    Scaling,
     Surface,
     change_terms,
     fit_terms,
@@ -59,7 +60,10 @@ def test_a_change_adds_to_the_surface(centred: bool) -> None:
     form = BUMP.forms[0]
     emulator = Emulator(
         "multibody", ["throw_distance"],
-        Surface(("a", "b"), np.array([10.0, 5.0]), np.array([2.0, 1.0]), base),
+        Surface(
+            Scaling(("a", "b"), np.zeros(2, bool), np.array([10.0, 5.0]), np.array([2.0, 1.0])),
+            base,
+        ),
         [Change(form, centred, coefficients)], ["throw_distance"],
     )  # fmt: skip
     at = np.array([[0.5, -1.0]])
@@ -76,3 +80,26 @@ def test_a_change_adds_to_the_surface(centred: bool) -> None:
     unknown = emulator(inputs, {"another": {"size": 1.0}})
     assert unknown is not None
     assert unknown.scalars == plain.scalars
+
+
+def test_a_power_law_of_positive_variables_is_straight() -> None:
+    rng = np.random.default_rng(2)
+    columns = {"speed": rng.uniform(7.0, 15.0, 300), "offset": rng.uniform(-0.5, 0.5, 300)}
+    scaling = Scaling.of(columns, ("speed", "offset"))
+    assert scaling.logarithmic.tolist() == [True, False]
+    x = scaling.points(columns)
+    assert x.mean(axis=0) == pytest.approx(0.0, abs=1e-12)
+    assert x.std(axis=0) == pytest.approx(1.0)
+    throw = 0.08 * columns["speed"] ** 1.9 * np.exp(0.2 * columns["offset"])
+    coefficients, left = fit_terms(quadratic_terms(x), np.log(throw)[:, None])
+    assert np.abs(left).max() < 1e-3
+    assert np.abs(coefficients[3:]).max() < 1e-3
+
+
+def test_few_parameters_have_a_cubic_change_and_many_a_quadratic_one() -> None:
+    rng = np.random.default_rng(5)
+    z, x = rng.standard_normal((120, 1)), rng.standard_normal((120, 2))
+    bent = (0.3 * z[:, 0] ** 3 + z[:, 0] * x[:, 0] * x[:, 1])[:, None]
+    _, left = fit_terms(change_terms(z, x, centred=True), bent)
+    assert np.abs(left).max() < 0.05
+    assert change_terms(rng.standard_normal((120, 4)), x, centred=True).shape[1] == 4 + 10 + 8

@@ -115,9 +115,8 @@ def test_accidents_with_a_wet_road_are_diagnosed(
     choice = choose_model(data, ACCIDENTS)
     problem = build_problem(data, choice, simulation_of(data, choice))
     causes = chosen("wet_road", "brake_dive")
-    problem, emulator = accidents.build_collection(
-        problem, data, choice, causes, seed=1, workers=1, quiet=True
-    )
+    surfaces = accidents.fit_surfaces(problem, data, choice, causes, seed=1, workers=1, quiet=True)
+    problem, emulator = surfaces.problem_of(problem), surfaces.emulator
     found = search(problem, causes)
     assert found.cause == "wet_road"
     # Signals it has none; a further scalar it has.

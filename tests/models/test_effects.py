@@ -22,7 +22,7 @@ Effects = Mapping[str, Mapping[str, float]]
 CURVE = [[0.0, 0.0], [0.015, 2600.0], [0.055, 3600.0], [0.1, 5200.0]]
 CRASH_SPEED = 11.111111111111111
 CRASH = {"late_braking", "brake_dive", "muscle_tone", "braced_posture", "shoulder_compliance",
-         "wet_road", "road_slope", "restitution"}  # fmt: skip
+         "friction_level", "wet_road", "road_slope", "restitution"}  # fmt: skip
 
 
 def struck(effects: Effects | None = None, channel_class: float = 1000.0, **inputs: float) -> Run:
@@ -37,6 +37,16 @@ def crash(effects: Effects | None = None, **inputs: float) -> dict[str, float]:
 @functools.cache
 def plain() -> dict[str, float]:
     return crash()
+
+
+def test_another_friction_level_is_the_crash_on_that_road() -> None:
+    friction = next(
+        item.nominal for item in load_model("multibody").inputs if item.name == "friction_body_road"
+    )
+    slippery = crash({"friction_level": {"factor": 0.7}})
+    assert slippery == crash(friction_body_road=0.7 * friction)
+    assert slippery["throw_distance"] > 1.1 * plain()["throw_distance"]
+    assert slippery["hic15"] == plain()["hic15"]
 
 
 def test_the_crash_has_the_crash_effects() -> None:

@@ -110,7 +110,7 @@ def checks_alone() -> Iterator[None]:
     with (
         mock.patch.object(runner, "run", side_effect=Reached),
         mock.patch.object(diagnosis, "search", side_effect=Reached),
-        mock.patch.object(diagnosis, "build_collection", side_effect=Reached),
+        mock.patch.object(diagnosis, "fit_surfaces", side_effect=Reached),
     ):
         yield
 

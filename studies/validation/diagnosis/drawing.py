@@ -120,7 +120,72 @@ OUTSIDE: list[Draw] = [
     _one("guide_friction", "", force=(40.0, 400.0)),
     _one("mount_resonance", "", frequency=(500.0, 900.0), damping_ratio=(0.05, 0.15)),
 ]
+CRASHES: dict[str, list[Draw]] = {
+    "none": [],
+    "sensor_gain": [
+        _factor("sensor_gain", 0.03, 0.15),
+        _one("sensor_gain", "warming", "change", change=(0.05, 0.15)),
+    ],
+    "sensor_offset": [
+        _one("sensor_offset", "catalogue", "offset", offset=(1.5, 6.0)),
+        _one("sensor_offset", "drifting", "offset", offset=(3.0, 10.0)),
+    ],
+    "sensor_saturation": [
+        _one("sensor_saturation", "catalogue", limit=(40.0, 80.0)),
+        _one(
+            "sensor_saturation",
+            "recovery",
+            limit=(40.0, 80.0),
+            depth=(0.05, 0.3),
+            time=(0.001, 0.005),
+        ),
+    ],
+    "sensor_filter": [
+        _one("sensor_filter", "catalogue", channel_class=(60.0, 250.0)),
+        _one("sensor_filter", "bessel", channel_class=(60.0, 250.0)),
+        _one("sensor_filter", "forward", channel_class=(60.0, 250.0)),
+    ],
+    "time_scale": [_factor("time_scale", 0.01, 0.06)],
+    "speed_bias": [_factor("speed_bias", 0.02, 0.1)],
+    "hood_bottoming": [
+        _one("hood_bottoming", "hertz", clearance=(0.035, 0.05), stiffness=(3e5, 1.5e6)),
+    ],
+    "hood_yield": [
+        _one("hood_yield", "catalogue", force=(1400.0, 2200.0), remaining=(0.1, 0.5)),
+    ],
+    "mass_error": [_factor("mass_error", 0.08, 0.3)],
+    "brake_dive": [_one("brake_dive", "catalogue", "angle", angle=(0.008, 0.04))],
+    "muscle_tone": [_factor("muscle_tone", 0.6, 2.5)],
+    "friction_level": [_factor("friction_level", 0.1, 0.4)],
+}
+"""Effects of full-scale tests by the name of the cause; of the ten and more, those of the
+instruments have foreign forms too."""
+ACCIDENTS: dict[str, list[Draw]] = {
+    "none": [],
+    "wet_road": [_one("wet_road", "catalogue", place=(3.0, 9.0), factor=(0.35, 0.65))],
+    "road_slope": [_one("road_slope", "catalogue", "angle", angle=(0.04, 0.1))],
+    "late_braking": [_one("late_braking", "catalogue", delay=(0.3, 1.2))],
+    "speed_bias": [_factor("speed_bias", 0.08, 0.25)],
+    "friction_level": [_factor("friction_level", 0.12, 0.45)],
+}
+"""Effects of accident collections by the name of the cause."""
 KINDS = ("none", "own form", "foreign form", "outside", "pair")
+
+
+def draw_of(seed: int, cause: str, table: dict[str, list[Draw]]) -> list[Hidden]:
+    """Return the hidden effect of a full-scale set or a collection.
+
+    Parameters
+    ----------
+    seed : int
+    cause : str
+        A key of the table.
+    table : dict
+        ``CRASHES`` or ``ACCIDENTS``.
+    """
+    forms = table[cause]
+    rng = np.random.default_rng([seed, 79])
+    return [forms[seed % len(forms)](rng)] if forms else []
 
 
 def draw(seed: int, kind: str) -> list[Hidden]:

@@ -1,7 +1,8 @@
 """Accident collections with a hidden effect: the crash core with altered inputs.
 
-Nothing of the diagnosis's catalogue is used: a wet road is a run with less friction for those who
-slide beyond a place, a nose that dives more is another angle, a softer hood another factor.
+Nothing of the diagnosis's catalogue is used but for a slope and for late braking, which act on the
+equations of motion: a wet road is a longer slide of those who pass a place, a nose that dives more
+is another angle, a softer hood another factor.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -45,6 +46,8 @@ ALTERED: dict[str, dict[str, Alter]] = {
     "friction_level": {"friction_body_road": _times},
 }
 """Effects by the inputs that differ from the recorded ones."""
+IN_THE_MODEL = ("late_braking", "road_slope")
+"""Effects that the crash model itself has."""
 
 
 def make_accidents(
@@ -72,6 +75,9 @@ def make_accidents(
     spare = 2 * accidents
     columns = map_inputs(study, model, rng.random((spare, len(study.inputs))))
     altered = alter({k: v.copy() for k, v in columns.items()}, hidden)
+    inside = {h.name: h.numbers for h in hidden if h.name in IN_THE_MODEL}
+    model = load_model(study.model.name, study.model.options, inside)
+    altered |= {item.name: np.full(spare, item.nominal) for item in model.inputs[len(columns) :]}
     names = [item.name for item in model.inputs]
     batch = model.run_batch(np.stack([altered[name] for name in names], axis=1))
     outputs = {item.name: batch.outputs[:, k] for k, item in enumerate(model.outputs)}

@@ -1,0 +1,239 @@
+"""Trials of full-scale tests and of accident collections: a hidden effect and the answer."""
+
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from mcstudy.diagnosis.problem import Cause, Observation, Problem, Simulate
+from mcstudy.diagnosis.search import UNEXPLAINED, Finding, search
+from mcstudy.execution.workers import run_jobs
+from mcstudy.measurement.measured_data import Measured, load_measured
+from studies.diagnosis.accidents import Surfaces, fit_surfaces
+from studies.diagnosis.causes import causes_of, stage_of
+from studies.diagnosis.model_choice import ModelChoice, choose_model
+from studies.diagnosis.posterior import describe
+from studies.diagnosis.problem import build_problem
+from studies.diagnosis.study import simulation_of
+from studies.validation.diagnosis.drawing import ACCIDENTS, CRASHES, draw_of
+from studies.validation.diagnosis.hidden_accidents import make_accidents
+from studies.validation.diagnosis.hidden_crashes import make_crashes
+from studies.validation.diagnosis.laboratory import Hidden
+
+GROUPS = 2
+"""Groups of collections, each with surfaces of its own."""
+
+
+@dataclass(frozen=True)
+class FullScaleTrial:
+    """A trial.
+
+    Attributes
+    ----------
+    seed : int
+        Of effect and noise.
+    cause : str
+        Hidden cause, a key of ``drawing.CRASHES`` or ``drawing.ACCIDENTS``.
+    reality : str
+        Model that stands for reality, of full-scale tests.
+    """
+
+    seed: int
+    cause: str
+    reality: str = "multibody"
+
+
+@dataclass(frozen=True)
+class FullScaleOutcome:
+    """Outcome of a trial.
+
+    Attributes
+    ----------
+    trial : FullScaleTrial
+    hidden : str
+        Effect, form and numbers.
+    cause : str or None
+        Cause of the answer, ``unexplained``, or None if the model is adequate.
+    named : tuple of str
+        All names that the answer gives.
+    flagged : bool
+        Whether structure remains.
+    p_value : float
+        Of the adequacy test.
+    covered : bool or None
+        Whether the 95 % intervals of the named cause hold the true numbers, if the hidden cause was
+        named first.
+    runs : int
+        Model runs of the search; of surfaces for accidents.
+    seconds : float
+        Of the search.
+    why : str
+        Reason in words.
+    """
+
+    trial: FullScaleTrial
+    hidden: str
+    cause: str | None
+    named: tuple[str, ...]
+    flagged: bool
+    p_value: float
+    covered: bool | None
+    runs: int
+    seconds: float
+    why: str
+
+    @property
+    def right(self) -> bool:
+        """Whether the hidden cause is among the names, or none is given where none is hidden."""
+        if self.trial.cause == "none":
+            return self.cause is None
+        return self.trial.cause in self.named
+
+
+class _Counter:
+    """A simulation with a counter of its tests."""
+
+    def __init__(self, simulate: Simulate) -> None:
+        self._simulate, self.runs = simulate, 0
+
+    def __call__(
+        self, inputs: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]
+    ) -> Observation | None:
+        """Return a simulated test."""
+        self.runs += 1
+        return self._simulate(inputs, effects)
+
+
+def run_crashes(trial: FullScaleTrial) -> FullScaleOutcome:
+    """Hide an effect in full-scale tests, diagnose them with the multibody model and assess it.
+
+    Parameters
+    ----------
+    trial : FullScaleTrial
+    """
+    hidden = draw_of(trial.seed, trial.cause, CRASHES)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / "tests"
+        make_crashes(folder, hidden, trial.seed, model=trial.reality, stated="multibody")
+        problem, _, choice = _read(folder, None)
+        causes = causes_of(choice.name, choice.options)
+        return _assess(trial, hidden, problem, causes)
+
+
+def run_accidents(trials: Sequence[FullScaleTrial], study_file: Path) -> list[FullScaleOutcome]:
+    """Hide effects in accident collections of one study, diagnose them and assess the answers.
+
+    All the collections are drawn from one study, so one set of surfaces, over the first of them,
+    serves them all.
+
+    Parameters
+    ----------
+    trials : sequence of FullScaleTrial
+    study_file : path
+        Monte Carlo study that the accidents are drawn from.
+    """
+    outcomes = []
+    surfaces: Surfaces | None = None
+    for trial in trials:
+        hidden = draw_of(trial.seed, trial.cause, ACCIDENTS)
+        with tempfile.TemporaryDirectory() as scratch:
+            folder = Path(scratch) / "tests"
+            make_accidents(folder, study_file, hidden, trial.seed)
+            problem, data, choice = _read(folder, study_file)
+            causes = causes_of(choice.name, choice.options)
+            causes = tuple(cause for cause in causes if stage_of(cause.name) != "signal")
+            if surfaces is None:
+                surfaces = fit_surfaces(
+                    problem, data, choice, causes, seed=trial.seed, workers=1, quiet=True
+                )
+            outcomes.append(_assess(trial, hidden, surfaces.problem_of(problem), causes))
+    return outcomes
+
+
+def plan_full_scale(causes: Sequence[str], sets: int, first: int) -> list[FullScaleTrial]:
+    """Return trials of each cause, with seeds of their own.
+
+    Parameters
+    ----------
+    causes : sequence of str
+    sets : int
+        Number of sets of each cause.
+    first : int
+        First seed.
+    """
+    return [
+        FullScaleTrial(first + sets * i + k, cause)
+        for i, cause in enumerate(causes)
+        for k in range(sets)
+    ]
+
+
+def run_full_scale(
+    crashes: Sequence[FullScaleTrial],
+    accidents: Sequence[FullScaleTrial],
+    study_file: Path,
+    workers: int,
+) -> tuple[list[FullScaleOutcome], list[FullScaleOutcome]]:
+    """Return the outcomes of full-scale tests and of accident collections.
+
+    Parameters
+    ----------
+    crashes, accidents : sequence of FullScaleTrial
+    study_file : path
+        Monte Carlo study that the accidents are drawn from.
+    workers : int
+        Processes, -1 for one a core.
+    """
+    parts = [accidents[k::GROUPS] for k in range(GROUPS)]
+    found = run_jobs(partial(run_accidents, study_file=study_file), parts, workers)
+    return run_jobs(run_crashes, crashes, workers), [outcome for part in found for outcome in part]
+
+
+def _read(folder: Path, study_file: Path | None) -> tuple[Problem, Measured, ModelChoice]:
+    data = load_measured(folder)
+    choice = choose_model(data, study_file)
+    return build_problem(data, choice, simulation_of(data, choice)), data, choice
+
+
+def _assess(
+    trial: FullScaleTrial, hidden: Sequence[Hidden], problem: Problem, causes: Sequence[Cause]
+) -> FullScaleOutcome:
+    counter = _Counter(problem.simulate)
+    problem = Problem(problem.tests, problem.unknowns, counter, problem.ranges)
+    start = time.perf_counter()
+    finding = search(problem, causes)
+    seconds = time.perf_counter() - start
+    return FullScaleOutcome(
+        trial=trial,
+        hidden="; ".join(f"{h.name} ({h.form}): {dict(h.numbers)}" for h in hidden),
+        cause=finding.cause,
+        named=_names(finding),
+        flagged=finding.flagged,
+        p_value=finding.screening.p_value,
+        covered=_covered(problem, finding, hidden),
+        runs=counter.runs,
+        seconds=seconds,
+        why=finding.why,
+    )
+
+
+def _names(finding: Finding) -> tuple[str, ...]:
+    """Return all the names that an answer gives."""
+    if finding.cause is None or finding.cause == UNEXPLAINED:
+        return ()
+    first = finding.ambiguous or (finding.cause,)
+    second = finding.second.cause.name if finding.second else ""
+    return (*first, *(finding.second_ambiguous or ((second,) if second else ())))
+
+
+def _covered(problem: Problem, finding: Finding, hidden: Sequence[Hidden]) -> bool | None:
+    """Return whether 95 % intervals hold the true numbers of an effect of the catalogue's form."""
+    if finding.best is None or not hidden or finding.cause != hidden[0].name:
+        return None
+    if hidden[0].form != "catalogue":
+        return None
+    rows = {row["name"]: row for row in describe(problem, finding.best)[hidden[0].name]}
+    known = [(rows[name], true) for name, true in hidden[0].numbers.items() if name in rows]
+    return all(row["low"] <= true <= row["high"] for row, true in known) if known else None

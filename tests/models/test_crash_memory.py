@@ -1,0 +1,57 @@
+"""Crashes that differ only in how they were recorded are stepped once."""
+
+import pytest
+
+from models.multibody.model import MultibodyModel
+from models.protocol import Run
+from models.registry import load_model
+
+SEEN, OUTPUTS = ("head_acceleration",), ("throw_distance", "wad", "hic15")
+
+
+class _Counting(MultibodyModel):
+    """The multibody model with a counter of step loops."""
+
+    loops = 0
+
+    def _step(self, values):  # type: ignore[no-untyped-def]
+        self.loops += 1
+        return super()._step(values)
+
+
+def _observe(model: MultibodyModel, speed: float, factor: float) -> Run:
+    return model.observe({"impact_speed": speed, "sensor_gain_factor": factor}, SEEN, OUTPUTS)
+
+
+def test_sizes_of_a_sensor_error_share_a_crash_and_nothing_else_does() -> None:
+    model = _Counting(effects={"sensor_gain": {}})
+    runs = [(9.0, 1.0), (9.5, 1.0), (9.0, 1.1), (9.5, 0.9), (9.0, 1.0)]
+    seen = [_observe(model, *pair) for pair in runs]
+    assert model.loops == 2
+    for (speed, factor), run in zip(runs, seen, strict=True):
+        # A new model has nothing to recall.
+        alone = _observe(MultibodyModel(effects={"sensor_gain": {}}), speed, factor)
+        assert run.outputs == alone.outputs
+        assert run.inputs == alone.inputs
+        found, true = (r.histories["head"].channels["acceleration"] for r in (run, alone))
+        assert (found == true).all()
+
+
+def test_effects_on_the_crash_are_stepped_anew() -> None:
+    model = _Counting(effects={"hood_bottoming": {}})
+    sizes = (model._chain.inputs[0].nominal, model._chain.inputs[0].high)
+    outcomes = [
+        model.observe({model._chain.inputs[0].name: size}, SEEN, OUTPUTS).outputs for size in sizes
+    ]
+    assert model.loops == 2
+    assert outcomes[0] != outcomes[1]
+
+
+@pytest.mark.parametrize("name", ["multibody", "planar"])
+def test_a_crash_is_kept_while_others_run(name: str) -> None:
+    model = load_model(name, {}, {"time_scale": {}})
+    factor = model.inputs[-1].name
+    first = model.observe({"impact_speed": 8.0}, SEEN, OUTPUTS)
+    model.observe({"impact_speed": 12.0}, SEEN, OUTPUTS)
+    again = model.observe({"impact_speed": 8.0, factor: 1.0}, SEEN, OUTPUTS)
+    assert first.outputs == again.outputs

@@ -15,6 +15,7 @@ from studies.kind import StudyKind
 from studies.model_comparison.study import Comparison
 from studies.monte_carlo.study import MonteCarlo
 from studies.morris.study import Morris
+from studies.multi_fidelity.study import MultiFidelity
 from studies.reconstruction.schema import Reconstruction
 from studies.response_map.study import ResponseMap
 from studies.sobol.study import Sobol
@@ -28,6 +29,7 @@ KINDS: dict[str, StudyKind[Any, Any, Any, Any]] = {
         Injury(),
         Comparison(),
         ResponseMap(),
+        MultiFidelity(),
     )
 }
 """A new kind of study is its folder and one line here."""

@@ -26,6 +26,8 @@ LARGEST_RATIO = 1e6
 CLEARLY = 1.5
 """Variance of multi-fidelity Monte Carlo over that of control variates that makes them worthwhile
 (assumed)."""
+HIGHEST = 1.0 - 1e-6
+"""Squared correlation beyond which a pilot sample cannot tell two models apart (assumed)."""
 STARTS = (2.0, 20.0, 200.0)
 """Ratios of runs from which the numerical allocation starts."""
 
@@ -240,4 +242,6 @@ def _acv_ratios(covariance: Array, costs: Array) -> Array:
 
 def _squares(covariance: Array) -> Array:
     """Return the squared correlations (k,) with the dear model."""
-    return np.asarray(covariance[0] ** 2 / (covariance[0, 0] * np.diag(covariance)))
+    found = covariance[0] ** 2 / (covariance[0, 0] * np.diag(covariance))
+    found[1:] = np.minimum(found[1:], HIGHEST)
+    return np.asarray(found)

@@ -1,0 +1,1 @@
+"""Multi-fidelity Monte Carlo: the distribution of a dear model at the price of cheap ones."""

@@ -1,0 +1,334 @@
+"""The multi-fidelity study: pilot runs of all models, an allotment of the budget, nested runs.
+
+Every model has a cell of its own; run k of every cell has the same inputs and belongs to replicate
+``k % replicates``. Cheap models have more runs of the same design.
+"""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from mcstudy.errors import StudyError, UserError
+from mcstudy.execution.progress import say
+from mcstudy.execution.results import ResultsFolder, digest
+from mcstudy.execution.workers import Workers
+from mcstudy.multifidelity.allocation import allocate
+from mcstudy.report import Section, Table
+from mcstudy.studyfile.identity import numbers_digest
+from mcstudy.studyfile.schema import Design, ModelChoice, Report
+from mcstudy.studyfile.study_outputs import check_outputs, report_outputs
+from models.protocol import Model, complete_status
+from studies.kind import Finished, StudyKind
+from studies.monte_carlo.design import sample_inputs
+from studies.monte_carlo.schema import MonteCarloStudy
+from studies.multi_fidelity.analysis import Allotment, FidelityAnalysis, analyse
+from studies.multi_fidelity.report import draw, sections_of, summarise
+from studies.multi_fidelity.schema import FidelityStudy
+from studies.paired_runs import PreparedCell, cell_folder, cell_runs
+from studies.runs import columns_of, load_study_model, run_rows
+
+ALLOTMENT = "allotment.json"
+"""File of the measured costs and of the runs of each model."""
+TIMED = 1.0
+"""s of runs by which the cost of a run is measured, at least one run."""
+
+
+@dataclass(frozen=True)
+class FidelityResults:
+    """Input of the analysis: models, tables of runs and the allotment, by label."""
+
+    models: dict[str, Model]
+    runs: dict[str, pd.DataFrame]
+    allotment: Allotment
+
+
+Done = Finished[FidelityStudy, FidelityResults, FidelityAnalysis]
+
+
+class MultiFidelity(
+    StudyKind[FidelityStudy, list[PreparedCell], FidelityResults, FidelityAnalysis]
+):
+    """The distribution of the dearest of several models, with the help of the others."""
+
+    schema = FidelityStudy
+    analysis = FidelityAnalysis
+
+    def plan(self, study: FidelityStudy, folder: ResultsFolder) -> list[PreparedCell]:
+        """Return the cells with the inputs of the pilot runs."""
+        cells = [_prepare(study, label, study.budget.pilot, folder) for label in study.models]
+        for cell in cells:
+            check_outputs(reported(study, cell.model), cell.model, f"models.{cell.name}")
+        return cells
+
+    def execute(
+        self,
+        study: FidelityStudy,
+        plan: list[PreparedCell],
+        folder: ResultsFolder,
+        *,
+        workers: Workers,
+        quiet: bool,
+    ) -> None:
+        """Run the pilot runs, allot the budget, and run the rest.
+
+        Parameters
+        ----------
+        study : FidelityStudy
+            Checked study file.
+        plan : list of PreparedCell
+            From ``plan``.
+        folder : ResultsFolder
+            Open for writing.
+        workers : int or str
+            Processes, -1 for one per core, or the address of a dask scheduler.
+        quiet : bool
+            No progress line.
+        """
+        manifest: dict[str, Any] = {
+            "format": "mcstudy-results/1",
+            "study": study.name,
+            "kind": study.kind,
+            "seed": study.seed,
+            "design": _design(len(plan) * study.budget.pilot, plan),
+            "finished": False,
+        }
+        folder.write_json("manifest.json", manifest)
+        for cell in plan:
+            _take_over(study, cell, folder)
+        pilots = {
+            cell.name: _run(study, cell, study.budget.pilot, folder, workers, quiet)
+            for cell in plan
+        }
+        allotment = _allot(study, plan, pilots, folder)
+        folder.write_json(ALLOTMENT, allotment)
+        manifest["design"] = _design(sum(allotment.runs.values()), plan)
+        folder.write_json("manifest.json", manifest)
+        digests, counts = {}, pd.Series(dtype=int)
+        for cell in plan:
+            n = allotment.runs[cell.name]
+            whole = _prepare(study, cell.name, n, folder)
+            say(f"{cell.name}: {n:,} runs of {allotment.costs[cell.name]:.3g} s", quiet=quiet)
+            runs = _run(study, whole, n, folder, workers, quiet)
+            digests[cell.name] = digest(runs)
+            counts = counts.add(runs["status"].value_counts(), fill_value=0)
+        manifest |= {
+            "counts": {str(k): int(v) for k, v in counts.items()},
+            "digests": digests,
+            "finished": True,
+        }
+        folder.write_json("manifest.json", manifest)
+
+    def results(self, study: FidelityStudy, folder: ResultsFolder) -> FidelityResults:
+        """Return models, runs and allotment."""
+        if not (folder.path / ALLOTMENT).exists():
+            raise UserError(f"{folder.path}: the pilot runs are not done; run the study again")
+        allotment = Allotment(**folder.read_json(ALLOTMENT))
+        models = {
+            label: load_study_model(cell_study(study, label, study.budget.pilot))
+            for label in study.models
+        }
+        runs = {
+            label: cell_runs(folder, label, allotment.runs[label], model)
+            for label, model in models.items()
+        }
+        return FidelityResults(models, runs, allotment)
+
+    def analyse(self, study: FidelityStudy, results: FidelityResults) -> FidelityAnalysis:
+        """Return every number that the report prints."""
+        first = results.models[results.allotment.order[0]]
+        outputs = reported(study, first)
+        return analyse(study, results.models, results.runs, results.allotment, outputs)
+
+    def subtitle(self, done: Done) -> str:
+        """Return the line below the report's title."""
+        allotment = done.analysis.allotment
+        runs = ", ".join(f"{allotment.runs[label]:,} of {label}" for label in allotment.order)
+        return (
+            f"Distribution of {allotment.order[0]} by {allotment.method}: runs {runs}, "
+            f"seed {done.study.seed}"
+        )
+
+    def draw(self, done: Done) -> dict[str, Any]:
+        """Return the figures by file name."""
+        return draw(done.analysis)
+
+    def sections(self, done: Done, figures: Mapping[str, Any]) -> Sequence[Section]:
+        """Return the sections of the report."""
+        return sections_of(done.analysis, figures)
+
+    def summarise(self, analysis: FidelityAnalysis) -> list[Table]:
+        """Return models and estimates."""
+        return summarise(analysis)
+
+
+def _design(n: int, cells: Sequence[PreparedCell]) -> dict[str, Any]:
+    """Return the design of the manifest: the runs of all cells."""
+    return {"method": "monte-carlo", "n": n, "cells": [cell.name for cell in cells]}
+
+
+def cell_study(study: FidelityStudy, label: str, n: int) -> MonteCarloStudy:
+    """Return the Monte Carlo study of one model and n runs."""
+    chosen = study.models[label]
+    return MonteCarloStudy(
+        format=study.format, kind="monte-carlo", name=study.name, title=study.title,
+        seed=study.seed, model=ModelChoice(name=chosen.name, options=chosen.options),
+        fixed=study.fixed, design=Design(method="monte-carlo", n=n), inputs=study.inputs,
+        dependence=study.dependence, max_failure_rate=study.max_failure_rate,
+        run_time=study.run_time, report=Report(outputs=study.report.outputs, histories=0),
+    )  # fmt: skip
+
+
+def reported(study: FidelityStudy, model: Model) -> list[str]:
+    """Return the outputs of the report: those named, that of the budget, those with limits."""
+    base = report_outputs(cell_study(study, next(iter(study.models)), study.budget.pilot), model)
+    return list(dict.fromkeys([*base, study.budget.output, *study.report.limits]))
+
+
+def _prepare(study: FidelityStudy, label: str, n: int, folder: ResultsFolder) -> PreparedCell:
+    """Return a model's cell with the values of every input of its first n runs.
+
+    Raises
+    ------
+    UserError
+        Naming the model, if the study does not fit it or its folder.
+    """
+    inner = cell_study(study, label, n)
+    try:
+        model = load_study_model(inner)
+        columns = sample_inputs(inner, model)
+        cell_folder(folder, label).check_same_study(numbers_digest(inner, model))
+    except UserError as error:
+        raise UserError(f"models.{label}: {error}") from None
+    return PreparedCell(label, inner, model, columns)
+
+
+def _take_over(study: FidelityStudy, cell: PreparedCell, folder: ResultsFolder) -> None:
+    """Copy the runs of a finished study of the same design into a cell that has none.
+
+    Raises
+    ------
+    UserError
+        If the study has other inputs, another seed or another model.
+    """
+    source = study.models[cell.name].reuse
+    inner = cell_folder(folder, cell.name)
+    if source is None or inner.done() is not None:
+        return
+    finished = ResultsFolder(Path(source))
+    if not (finished.path / "manifest.json").exists():
+        raise UserError(f"models.{cell.name}.reuse: {source}: is no results folder")
+    try:
+        finished.check_same_study(numbers_digest(cell.study, cell.model))
+    except UserError as error:
+        raise UserError(f"models.{cell.name}.reuse: {error}") from None
+    with inner.open_for_writing():
+        inner.add_part(finished.runs(columns_of(cell.model)))
+
+
+def _run(
+    study: FidelityStudy,
+    cell: PreparedCell,
+    n: int,
+    folder: ResultsFolder,
+    workers: Workers,
+    quiet: bool,
+) -> pd.DataFrame:
+    """Return the first n runs of a cell, after running those that are missing."""
+    inner = cell_folder(folder, cell.name)
+    try:
+        with inner.open_for_writing():
+            return run_rows(
+                cell.study, cell.model, cell.columns, inner,
+                design={"method": "monte-carlo", "n": n, "replicate_size": 1},
+                replicate=np.arange(n) % study.budget.replicates, workers=workers, quiet=quiet,
+            )  # fmt: skip
+    except StudyError as error:
+        raise StudyError(f"models.{cell.name}: {error}") from None
+
+
+def _allot(
+    study: FidelityStudy,
+    cells: Sequence[PreparedCell],
+    pilots: Mapping[str, pd.DataFrame],
+    folder: ResultsFolder,
+) -> Allotment:
+    """Return the runs of each model; costs that were measured before are kept.
+
+    Raises
+    ------
+    StudyError
+        If the budget is too small, or too few pilot runs have a value by every model.
+    """
+    kept = folder.read_json(ALLOTMENT)["costs"] if (folder.path / ALLOTMENT).exists() else {}
+    costs = {
+        cell.name: study.models[cell.name].cost or kept.get(cell.name) or measured_cost(cell)
+        for cell in cells
+    }
+    budget = study.budget
+    order = sorted(costs, key=lambda label: -costs[label])
+    if budget.reference is not None:
+        order = [budget.reference, *(label for label in order if label != budget.reference)]
+    by_name = {cell.name: cell for cell in cells}
+    table = np.stack(
+        [known_values(pilots[label], by_name[label].model, budget.output) for label in order]
+    )[:, : budget.pilot]
+    table = table[:, np.isfinite(table).all(axis=0)]
+    if table.shape[1] < budget.pilot / 2:
+        raise StudyError(
+            f"budget.output: only {table.shape[1]} of {budget.pilot} pilot runs have a value of "
+            f"{budget.output} by every model"
+        )
+    price = np.array([costs[label] for label in order])
+    try:
+        found = allocate(np.cov(table), price, budget.seconds, multiple=budget.replicates)
+    except ValueError as error:
+        raise StudyError(f"budget: {error}") from None
+    runs = dict.fromkeys(order, budget.pilot)
+    for k, n in zip(found.models, found.runs, strict=True):
+        runs[order[k]] = max(n, budget.pilot)
+    correlations = np.atleast_2d(np.corrcoef(table))[0]
+    return Allotment(
+        method=found.method,
+        order=[order[k] for k in found.models],
+        left_out=[label for k, label in enumerate(order) if k not in found.models],
+        costs=costs,
+        runs=runs,
+        pilot_correlation=dict(zip(order, correlations.tolist(), strict=True)),
+        predicted_ratio=found.variance / found.variance_alone,
+        seconds=budget.seconds,
+        replicates=budget.replicates,
+    )
+
+
+def known_values(runs: pd.DataFrame, model: Model, output: str) -> NDArray[np.float64]:
+    """Return an output (n,) of a model's runs, NaN where a run failed."""
+    complete = runs["status"].isin(complete_status(model))
+    return runs[output].where(complete).to_numpy(dtype=float)
+
+
+def measured_cost(cell: PreparedCell) -> float:
+    """Return the time of one run of a cell (s), of its first inputs, on this machine.
+
+    A cheap model is run once before, so that its code is compiled; to a dear one that is little.
+
+    Parameters
+    ----------
+    cell : PreparedCell
+    """
+    rows = np.stack([cell.columns[item.name] for item in cell.model.inputs], axis=1)
+    if cell.model.cost < TIMED:
+        cell.model.run_batch(rows[:1])
+    spent = []
+    for row in rows:
+        start = time.perf_counter()
+        cell.model.run_batch(row[None])
+        spent.append(time.perf_counter() - start)
+        if sum(spent) > TIMED:
+            break
+    return float(np.mean(spent))

@@ -228,17 +228,31 @@ def validate(
         bool, typer.Option("--diagnosis", help="Hide effects in data and measure detection rates.")
     ] = False,
     sets: Annotated[int, typer.Option(min=20, help="Approximate sets with --diagnosis.")] = 300,
+    full_scale: Annotated[
+        int,
+        typer.Option(min=0, help="Sets a cause of full-scale tests and accidents to diagnose."),
+    ] = 0,
     workers: Workers = -1,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
     """Run the models against closed forms, published numbers and measurements.
 
-    With --diagnosis: hide effects in data, diagnose them, and print the detection rates.
+    With --diagnosis: hide effects in data, diagnose them, and print the detection rates; with
+    --full-scale N the same for N sets a cause of full-scale tests and accidents (minutes a set).
     """
     from mcstudy.execution.results import ResultsFolder
     from studies.validation import report
+    from studies.validation.diagnosis import full_scale as full
     from studies.validation.diagnosis import tier
+
+    if full_scale:
+        target = ResultsFolder(out or Path("results/validation_full_scale"))
+        found = full.validate_full_scale(
+            target, Path("configs/accidents.toml"), sets=full_scale, workers=workers
+        )
+        _print_analysis(found, full.summarise(found), target.path, quiet=quiet, as_json=as_json)
+        return
 
     if diagnosis:
         target = ResultsFolder(out or Path("results/validation_diagnosis"))

@@ -233,10 +233,9 @@ def _judge(
     flagged = replace(
         alone, flagged=True, why="one cause explains most of the misfit; structure remains"
     )
-    little = best.log_evidence < WIDENING * doubt
+    little = not clean and best.log_evidence < WIDENING * doubt
     if (
         clean
-        and not little
         and left.left < STILL
         and not _trace(problem, causes, empty.layouts, best.fitted, workers)
     ):

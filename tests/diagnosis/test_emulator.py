@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from linear_tests import BUMP
 
+from mcstudy.diagnosis.problem import Problem, Scalar, Test
+from studies.diagnosis.accidents import Surfaces
 from studies.diagnosis.emulator import (
     Change,
     Emulator,
@@ -103,3 +105,24 @@ def test_few_parameters_have_a_cubic_change_and_many_a_quadratic_one() -> None:
     _, left = fit_terms(change_terms(z, x, centred=True), bent)
     assert np.abs(left).max() < 0.05
     assert change_terms(rng.standard_normal((120, 4)), x, centred=True).shape[1] == 4 + 10 + 8
+
+
+def test_an_accident_of_another_kind_gets_no_weight_and_a_common_shift_takes_none() -> None:
+    """Thirty wrap-around distances 20 % longer than the surface, and one of a third of it."""
+    rng = np.random.default_rng(8)
+    speed = rng.uniform(8.0, 14.0, 31)
+    scaling = Scaling.of({"speed": speed}, ("speed",))
+    surface = Surface(scaling, np.array([[np.log(1.5)], [0.02], [0.0]]))
+    emulator = Emulator("multibody", ["log_wad"], surface, [], ["log_wad"])
+    surfaces = Surfaces(emulator, {"log_wad": 0.03})
+    tests = []
+    for k, v in enumerate(speed):
+        usual = np.exp(surface.coefficients[0, 0] + 0.02 * scaling.points({"speed": [v]})[0, 0])
+        factor = 0.33 if k == 7 else 1.2 * np.exp(0.03 * rng.standard_normal())
+        scalars = (Scalar("wad", usual * factor, 0.02),)
+        tests.append(Test(f"a{k}", {"speed": v}, {}, (), scalars, (), {"order": float(k)}))
+    problem = Problem(tuple(tests), (), emulator, {})
+    assert surfaces.outlying(problem) == {"log_wad": ("a7",)}
+    held = surfaces.problem_of(problem)
+    assert [np.isfinite(t.scalars[0].sd) for t in held.tests] == [k != 7 for k in range(31)]
+    assert held.tests[0].scalars[0].value == pytest.approx(np.log(tests[0].scalars[0].value))

@@ -2,26 +2,36 @@
 
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from mcstudy.diagnosis.problem import Cause, Observation, Problem, Simulate
 from mcstudy.diagnosis.search import UNEXPLAINED, Finding, search
+from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import run_jobs
 from mcstudy.measurement.measured_data import Measured, load_measured
+from mcstudy.report import Section, Table
+from mcstudy.text import number
 from studies.diagnosis.accidents import Surfaces, fit_surfaces
 from studies.diagnosis.causes import causes_of, stage_of
 from studies.diagnosis.model_choice import ModelChoice, choose_model
 from studies.diagnosis.posterior import describe
 from studies.diagnosis.problem import build_problem
 from studies.diagnosis.study import simulation_of
+from studies.publishing import publish
 from studies.validation.diagnosis.drawing import ACCIDENTS, CRASHES, draw_of
 from studies.validation.diagnosis.hidden_accidents import make_accidents
 from studies.validation.diagnosis.hidden_crashes import make_crashes
 from studies.validation.diagnosis.laboratory import Hidden
 
+FIRST = 20_000
+"""First seed."""
 GROUPS = 2
 """Groups of collections, each with surfaces of its own."""
 
@@ -237,3 +247,74 @@ def _covered(problem: Problem, finding: Finding, hidden: Sequence[Hidden]) -> bo
     rows = {row["name"]: row for row in describe(problem, finding.best)[hidden[0].name]}
     known = [(rows[name], true) for name, true in hidden[0].numbers.items() if name in rows]
     return all(row["low"] <= true <= row["high"] for row, true in known) if known else None
+
+
+def validate_full_scale(
+    folder: ResultsFolder, study_file: Path, *, sets: int, workers: int
+) -> dict[str, Any]:
+    """Hide effects in full-scale tests and accident collections, diagnose them, write the report.
+
+    Parameters
+    ----------
+    folder : ResultsFolder
+        Folder of the report.
+    study_file : path
+        Monte Carlo study that the accidents are drawn from.
+    sets : int
+        Sets of each cause.
+    workers : int
+        Processes, -1 for one a core.
+    """
+    crashes, accidents = run_full_scale(
+        plan_full_scale(list(CRASHES), sets, FIRST),
+        plan_full_scale(list(ACCIDENTS), sets, FIRST),
+        study_file,
+        workers,
+    )
+    analysis = {
+        "crashes": [asdict(outcome) | {"right": outcome.right} for outcome in crashes],
+        "accidents": [asdict(outcome) | {"right": outcome.right} for outcome in accidents],
+    }
+    with folder.open_for_writing():
+        return publish(
+            folder, "Diagnosis of full-scale tests and accidents",
+            f"{sets} sets of each cause from seed {FIRST} on", analysis, lambda _: {},
+            lambda held, _: [Section("Answers", [], summarise(held))],
+        )  # fmt: skip
+
+
+def summarise(analysis: Mapping[str, Any]) -> list[Table]:
+    """Return the answers by hidden cause, of full-scale tests and of accidents.
+
+    Parameters
+    ----------
+    analysis : mapping
+        From ``validate_full_scale``.
+    """
+    titles = {
+        "crashes": "Full-scale tests: multibody crashes, five tests a set.",
+        "accidents": "Collections of sixty accidents.",
+    }
+    tables = []
+    for key, title in titles.items():
+        rows = []
+        for cause in dict.fromkeys(row["trial"]["cause"] for row in analysis[key]):
+            part = [row for row in analysis[key] if row["trial"]["cause"] == cause]
+            covered = [row["covered"] for row in part if row["covered"] is not None]
+            answers = Counter(
+                "adequate" if row["cause"] is None else " + ".join(row["named"]) or row["cause"]
+                for row in part
+            )
+            rows.append(
+                [
+                    cause,
+                    f"{sum(row['right'] for row in part)} of {len(part)}",
+                    f"{sum(covered)} of {len(covered)}",
+                    number(float(np.median([row["runs"] for row in part]))),
+                    number(float(np.median([row["seconds"] for row in part]))),
+                    ", ".join(f"{name} ({count})" for name, count in answers.most_common()),
+                ]
+            )
+        heads = ["hidden", "right", "size within 95 %", "runs", "s on one core", "answers"]
+        tables.append(Table(title, heads, rows))
+    return tables

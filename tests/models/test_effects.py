@@ -46,7 +46,8 @@ def test_another_friction_level_is_the_crash_on_that_road() -> None:
     slippery = crash({"friction_level": {"factor": 0.7}})
     assert slippery == crash(friction_body_road=0.7 * friction)
     assert slippery["throw_distance"] > 1.1 * plain()["throw_distance"]
-    assert slippery["hic15"] == plain()["hic15"]
+    # The feet slide on the road during the impact, which changes the head's blow a little.
+    assert slippery["hic15"] == pytest.approx(plain()["hic15"], rel=0.01)
 
 
 def test_the_crash_has_the_crash_effects() -> None:

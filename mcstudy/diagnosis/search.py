@@ -120,6 +120,26 @@ class Finding:
         return self.cause is None
 
 
+def names_of(
+    cause: str | None,
+    ambiguous: tuple[str, ...],
+    second: str | None,
+    second_ambiguous: tuple[str, ...],
+) -> tuple[str, ...]:
+    """Return all the names that an answer gives, ambiguous ones included.
+
+    Parameters
+    ----------
+    cause, second : str or None
+        As in ``Finding``, by name.
+    ambiguous, second_ambiguous : tuple of str
+        As in ``Finding``.
+    """
+    if cause is None or cause == UNEXPLAINED:
+        return ()
+    return (*(ambiguous or (cause,)), *(second_ambiguous or ((second,) if second else ())))
+
+
 def fit_base(problem: Problem) -> tuple[tuple[Layout, ...], Fit]:
     """Return the layouts of the tests and the fit of the base model.
 

@@ -148,16 +148,18 @@ def analyse(
     unit_of = {item.name: item.unit for item in models[allotment.order[0]].outputs}
     found = {}
     for name in outputs:
-        columns = [
-            runs[label][name].where(runs[label]["status"].isin(complete_status(models[label])))
-            for label in allotment.order
-        ]
-        values = tuple(column.to_numpy(dtype=float) for column in columns)
+        values = tuple(known_values(runs[label], models[label], name) for label in allotment.order)
         if np.isfinite(values[0]).sum() < 2 * allotment.replicates:
             raise StudyError(f"{name}: too few runs of {allotment.order[0]} have a value")
         found[name] = _of_output(study, name, unit_of[name], values, allotment)
     ended = describe_ends(study, everything, complete, words)
     return FidelityAnalysis(**vars(ended), allotment=allotment, outputs=found)
+
+
+def known_values(runs: pd.DataFrame, model: Model, output: str) -> Array:
+    """Return an output (n,) of a model's runs, NaN where a run failed."""
+    complete = runs["status"].isin(complete_status(model))
+    return runs[output].where(complete).to_numpy(dtype=float)
 
 
 def _of_output(

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.progress import say
@@ -23,11 +22,11 @@ from mcstudy.report import Section, Table
 from mcstudy.studyfile.identity import numbers_digest
 from mcstudy.studyfile.schema import Design, ModelChoice, Report
 from mcstudy.studyfile.study_outputs import check_outputs, report_outputs
-from models.protocol import Model, complete_status
+from models.protocol import Model
 from studies.kind import Finished, StudyKind
 from studies.monte_carlo.design import sample_inputs
 from studies.monte_carlo.schema import MonteCarloStudy
-from studies.multi_fidelity.analysis import Allotment, FidelityAnalysis, analyse
+from studies.multi_fidelity.analysis import Allotment, FidelityAnalysis, analyse, known_values
 from studies.multi_fidelity.report import draw, sections_of, summarise
 from studies.multi_fidelity.schema import FidelityStudy
 from studies.paired_runs import PreparedCell, cell_folder, cell_runs
@@ -304,12 +303,6 @@ def _allot(
         seconds=budget.seconds,
         replicates=budget.replicates,
     )
-
-
-def known_values(runs: pd.DataFrame, model: Model, output: str) -> NDArray[np.float64]:
-    """Return an output (n,) of a model's runs, NaN where a run failed."""
-    complete = runs["status"].isin(complete_status(model))
-    return runs[output].where(complete).to_numpy(dtype=float)
 
 
 def measured_cost(cell: PreparedCell) -> float:

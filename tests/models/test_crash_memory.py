@@ -2,6 +2,7 @@
 
 import pytest
 
+from models.crash.outcome import Raw
 from models.multibody.model import MultibodyModel
 from models.protocol import Run
 from models.registry import load_model
@@ -14,7 +15,7 @@ class _Counting(MultibodyModel):
 
     loops = 0
 
-    def _step(self, values):  # type: ignore[no-untyped-def]
+    def _step(self, values: dict[str, float]) -> Raw | None:
         self.loops += 1
         return super()._step(values)
 

@@ -12,23 +12,20 @@ from typing import Any
 import numpy as np
 
 from mcstudy.diagnosis.problem import Cause, Observation, Problem, Simulate
-from mcstudy.diagnosis.search import UNEXPLAINED, Finding, search
+from mcstudy.diagnosis.search import Finding, names_of, search
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import run_jobs
-from mcstudy.measurement.measured_data import Measured, load_measured
 from mcstudy.report import Section, Table
 from mcstudy.text import number
 from studies.diagnosis.accidents import Surfaces, fit_surfaces
 from studies.diagnosis.causes import causes_of, stage_of
-from studies.diagnosis.model_choice import ModelChoice, choose_model
 from studies.diagnosis.posterior import describe
-from studies.diagnosis.problem import build_problem
-from studies.diagnosis.study import simulation_of
 from studies.publishing import publish
 from studies.validation.diagnosis.drawing import ACCIDENTS, CRASHES, draw_of
 from studies.validation.diagnosis.hidden_accidents import make_accidents
 from studies.validation.diagnosis.hidden_crashes import make_crashes
 from studies.validation.diagnosis.laboratory import Hidden
+from studies.validation.diagnosis.trial import read_tests
 
 FIRST = 20_000
 """First seed."""
@@ -127,7 +124,7 @@ def run_crashes(trial: FullScaleTrial) -> FullScaleOutcome:
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "tests"
         make_crashes(folder, hidden, trial.seed, model=trial.reality, stated="multibody")
-        problem, _, choice = _read(folder, None)
+        problem, _, choice = read_tests(folder)
         causes = causes_of(choice.name, choice.options)
         return _assess(trial, hidden, problem, causes)
 
@@ -151,7 +148,7 @@ def run_accidents(trials: Sequence[FullScaleTrial], study_file: Path) -> list[Fu
         with tempfile.TemporaryDirectory() as scratch:
             folder = Path(scratch) / "tests"
             make_accidents(folder, study_file, hidden, trial.seed)
-            problem, data, choice = _read(folder, study_file)
+            problem, data, choice = read_tests(folder, study_file)
             causes = causes_of(choice.name, choice.options)
             causes = tuple(cause for cause in causes if stage_of(cause.name) != "signal")
             if surfaces is None:
@@ -201,12 +198,6 @@ def run_full_scale(
     return run_jobs(run_crashes, crashes, workers), [outcome for part in found for outcome in part]
 
 
-def _read(folder: Path, study_file: Path | None) -> tuple[Problem, Measured, ModelChoice]:
-    data = load_measured(folder)
-    choice = choose_model(data, study_file)
-    return build_problem(data, choice, simulation_of(data, choice)), data, choice
-
-
 def _assess(
     trial: FullScaleTrial, hidden: Sequence[Hidden], problem: Problem, causes: Sequence[Cause]
 ) -> FullScaleOutcome:
@@ -219,7 +210,12 @@ def _assess(
         trial=trial,
         hidden="; ".join(f"{h.name} ({h.form}): {dict(h.numbers)}" for h in hidden),
         cause=finding.cause,
-        named=_names(finding),
+        named=names_of(
+            finding.cause,
+            finding.ambiguous,
+            finding.second.cause.name if finding.second else None,
+            finding.second_ambiguous,
+        ),
         flagged=finding.flagged,
         p_value=finding.screening.p_value,
         covered=_covered(problem, finding, hidden),
@@ -227,15 +223,6 @@ def _assess(
         seconds=seconds,
         why=finding.why,
     )
-
-
-def _names(finding: Finding) -> tuple[str, ...]:
-    """Return all the names that an answer gives."""
-    if finding.cause is None or finding.cause == UNEXPLAINED:
-        return ()
-    first = finding.ambiguous or (finding.cause,)
-    second = finding.second.cause.name if finding.second else ""
-    return (*first, *(finding.second_ambiguous or ((second,) if second else ())))
 
 
 def _covered(problem: Problem, finding: Finding, hidden: Sequence[Hidden]) -> bool | None:

@@ -19,10 +19,10 @@ from mcstudy.diagnosis.layout import Scatter
 from mcstudy.diagnosis.model_selection import rescale
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.diagnosis.screening import POWER
-from mcstudy.diagnosis.search import UNEXPLAINED, Finding, fit_base, search
-from mcstudy.measurement.measured_data import load_measured
+from mcstudy.diagnosis.search import Finding, fit_base, names_of, search
+from mcstudy.measurement.measured_data import Measured, load_measured
 from studies.diagnosis.causes import causes_of
-from studies.diagnosis.model_choice import choose_model
+from studies.diagnosis.model_choice import ModelChoice, choose_model
 from studies.diagnosis.problem import build_problem
 from studies.diagnosis.study import quantities, simulation_of
 from studies.validation.diagnosis.drawing import draw
@@ -136,12 +136,7 @@ class Outcome:
     @property
     def named(self) -> tuple[str, ...]:
         """The names that the answer gives, ambiguous ones included."""
-        if self.cause in (None, UNEXPLAINED):
-            return ()
-        assert self.cause is not None
-        first = self.ambiguous or (self.cause,)
-        second = self.second_ambiguous or ((self.second,) if self.second else ())
-        return (*first, *second)
+        return names_of(self.cause, self.ambiguous, self.second, self.second_ambiguous)
 
 
 def run_trial(trial: Trial, workers: int = 1) -> Outcome:
@@ -153,11 +148,11 @@ def run_trial(trial: Trial, workers: int = 1) -> Outcome:
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "tests"
         make_tests(folder, hidden, trial.seed, laboratory)
-        problem = _problem(folder)
+        problem, data, _ = read_tests(folder)
         start = time.perf_counter()
         finding = search(problem, causes_of("headform"), workers=workers)
         seconds = time.perf_counter() - start
-        judged = quantities(load_measured(folder))
+        judged = quantities(data)
         gains = _gains(problem, finding, judged, trial.seed) if _is_right(finding, hidden) else {}
         sizes = [
             _size(Path(scratch) / h.name, h, trial.seed, laboratory, problem, finding)
@@ -205,10 +200,20 @@ def _gains(problem: Problem, finding: Finding, judged: Quantities, seed: int) ->
     return found
 
 
-def _problem(folder: Path) -> Problem:
+def read_tests(
+    folder: Path, study_file: Path | None = None
+) -> tuple[Problem, Measured, ModelChoice]:
+    """Return the problem of a folder of tests, its data and the model.
+
+    Parameters
+    ----------
+    folder : path
+    study_file : path, optional
+        Study whose model is diagnosed, by default that which the data name.
+    """
     data = load_measured(folder)
-    choice = choose_model(data, None)
-    return build_problem(data, choice, simulation_of(data, choice))
+    choice = choose_model(data, study_file)
+    return build_problem(data, choice, simulation_of(data, choice)), data, choice
 
 
 def _size(

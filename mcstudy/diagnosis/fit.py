@@ -276,6 +276,7 @@ def residuals_at(
     forms: Sequence[Form],
     scores: Scores,
     scatter: Scatter,
+    wide: Sequence[Observation] | None = None,
 ) -> tuple[Array, ...] | None:
     """Return the whitened residuals (n,) of every test; None if a run fails.
 
@@ -287,13 +288,15 @@ def residuals_at(
     scores : Scores
         Latents to simulate at.
     scatter : Scatter
+    wide : sequence of Observation, optional
+        Simulated tests whose factors on standard deviations apply.
     """
     seen = observe_tests(problem, forms, layouts, scores)
     if seen is None:
         return None
     return tuple(
-        layout.residual(part, own, scatter)
-        for layout, part, own in zip(layouts, seen, scores.own, strict=True)
+        layout.residual(part, own, scatter, like.widening)
+        for layout, part, own, like in zip(layouts, seen, scores.own, wide or seen, strict=True)
     )
 
 
@@ -308,6 +311,8 @@ def _misfit(
     for layout, observation, own in zip(layouts, seen, scores.own, strict=True):
         residual = layout.residual(observation, own, scatter)
         total += weight**2 * float(residual @ residual) + float(own @ own)
+        if observation.widening:
+            total += 2.0 * weight**2 * float(np.log(layout.widths(observation)).sum())
     return 0.5 * total
 
 
@@ -397,7 +402,9 @@ def simulate_slopes(
         for step in (size, -size):
             moved_shared = scores.shared.copy()
             moved_shared[k] += step
-            found = residuals_at(problem, layouts, forms, Scores(moved_shared, scores.own), scatter)
+            # Deviations are held, as in a weighted least-squares fit.
+            moved_to = Scores(moved_shared, scores.own)
+            found = residuals_at(problem, layouts, forms, moved_to, scatter, seen)
             if found is not None:
                 ends.append((step, found))
                 if not central:

@@ -224,10 +224,32 @@ def _predict(
     return [
         _Prediction(
             place.whitened(observation, zero),
-            np.concatenate([whole.own_slopes[i], whole.shared_slopes[i] @ root], axis=1),
+            _spread_of(
+                np.concatenate([whole.own_slopes[i], whole.shared_slopes[i] @ root], axis=1),
+                place.widths(whole.observations[i]),
+                place.widths(observation),
+            ),
         )
         for i, place, observation, zero in zip(held, places, seen, own, strict=True)
     ]
+
+
+def _spread_of(slopes: Array, known: Array, widths: Array) -> Array:
+    """Return the covariance factor (n, k) over the stated deviations.
+
+    Parameters
+    ----------
+    slopes : (n, p) array
+        Slopes over wider deviations.
+    known : (n,) array
+        Factors on those deviations.
+    widths : (n,) array
+        Factors on the noise of the prediction; what exceeds the stated one adds columns.
+    """
+    wider = np.flatnonzero(widths > 1.0)
+    more = np.zeros((widths.size, wider.size))
+    more[wider, np.arange(wider.size)] = np.sqrt(widths[wider] ** 2 - 1.0)
+    return np.concatenate([known[:, None] * slopes, more], axis=1)
 
 
 def _corrected(

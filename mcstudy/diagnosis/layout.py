@@ -109,7 +109,13 @@ class Layout:
         phase = np.clip((time - begin) / (end - begin), 0.0, 1.0)
         return np.asarray(np.cos(np.pi * phase[:, None] * np.arange(MODES)))
 
-    def residual(self, seen: Observation, scores: Array, scatter: Scatter) -> Array:
+    def residual(
+        self,
+        seen: Observation,
+        scores: Array,
+        scatter: Scatter,
+        wide: Mapping[str, float] | None = None,
+    ) -> Array:
         """Return the whitened difference of measured and simulated data.
 
         Parameters
@@ -120,12 +126,31 @@ class Layout:
             Latents of the test's nuisances.
         scatter : Scatter
             Size of the repeatability.
+        wide : mapping of str to float, optional
+            Factors on the standard deviations of scalars, in place of those of ``seen``.
 
         Returns
         -------
         (n,) array
         """
-        return self._assemble(seen, scores, scatter)[0]
+        return self._assemble(seen, scores, scatter, wide)[0]
+
+    def widths(self, seen: Observation) -> Array:
+        """Return the factors (n,) on the stated deviations of the data that a simulation gives.
+
+        Data that are missing have one.
+
+        Parameters
+        ----------
+        seen : Observation
+            Simulated test.
+        """
+        samples = sum(signal.time.size for signal in self.test.signals)
+        own = [
+            seen.widening.get(scalar.name, 1.0) if np.isfinite(scalar.sd) else 1.0
+            for scalar in self.test.scalars
+        ]
+        return np.concatenate([np.ones(samples), own])
 
     def expand(self, seen: Observation, scores: Array, scatter: Scatter) -> tuple[Array, Array]:
         """Return the whitened residual and the analytic Jacobian of the simulated vector.
@@ -150,13 +175,13 @@ class Layout:
         return residual, columns
 
     def whitened(self, seen: Observation, scores: Array) -> Array:
-        """Return the whitened simulated vector (n,) without repeatability."""
+        """Return the simulated vector (n,) without repeatability, over the stated deviations."""
         return -self._assemble(
-            seen, np.where(self.scattering, 0.0, scores), NO_SCATTER, measured=False
+            seen, np.where(self.scattering, 0.0, scores), NO_SCATTER, {}, measured=False
         )[0]
 
     def simulated(self, seen: Observation, scores: Array, scatter: Scatter) -> Array:
-        """Return the whitened simulated vector with all nuisances applied.
+        """Return the simulated vector with all nuisances applied, over the stated deviations.
 
         Parameters
         ----------
@@ -171,7 +196,7 @@ class Layout:
         -------
         (n,) array
         """
-        return -self._assemble(seen, scores, scatter, measured=False)[0]
+        return -self._assemble(seen, scores, scatter, {}, measured=False)[0]
 
     def cosine(self, signal: str, order: int) -> Array:
         """Return a cosine over the pulse of one signal, as high as its peak, whitened (n,).
@@ -276,6 +301,7 @@ class Layout:
         seen: Observation,
         scores: Array,
         scatter: Scatter,
+        wide: Mapping[str, float] | None = None,
         *,
         slope: bool = False,
         measured: bool = True,
@@ -308,15 +334,17 @@ class Layout:
                     table[:, 1 + signals : 1 + signals + MODES] = sizes * modes * shape[:, None]
                     slopes.append(_whiten(table, signal.sd, signal.correlation))
         column = own - sum(scalar.scatters for scalar in test.scalars)
+        factors = seen.widening if wide is None else wide
         for scalar in test.scalars:
             value = seen.scalars[scalar.name]
+            sd = scalar.sd * factors.get(scalar.name, 1.0)
             off = scatter.level * scores[start + column] if scalar.scatters else 0.0
             given = scalar.value if measured else 0.0
-            parts.append(np.array([(given - value * (1.0 + off)) / scalar.sd]))
+            parts.append(np.array([(given - value * (1.0 + off)) / sd]))
             if slope:
                 row = np.zeros((1, own))
                 if scalar.scatters:
-                    row[0, column] = scatter.level * value / scalar.sd
+                    row[0, column] = scatter.level * value / sd
                 slopes.append(row)
             column += scalar.scatters
         return np.concatenate(parts), np.concatenate(slopes) if slope else None

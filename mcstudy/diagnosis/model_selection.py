@@ -10,20 +10,25 @@ from scipy import special
 
 from mcstudy.diagnosis.fit import Fit, fit, shared_names
 from mcstudy.diagnosis.layout import Layout, Scatter
-from mcstudy.diagnosis.linear_model import linearise
+from mcstudy.diagnosis.linear_model import linearise, solve
 from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Cause, Form, Problem
 from mcstudy.diagnosis.screening import estimate_scatter, remaining
+from mcstudy.diagnosis.shortlist import shortlist
 from mcstudy.diagnosis.survey import (
     CLOSE,
     approach,
     may_win,
     scan_scatter,
     survey,
+    weight_of,
 )
 from mcstudy.diagnosis.templates import (
+    Template,
+    cause_templates,
     drifts,
     fine_discrepancy,
+    named_forms,
     smooth_discrepancy,
 )
 from mcstudy.execution.workers import run_jobs
@@ -43,8 +48,8 @@ FAR_BEHIND, HALF = 200.0, 0.5
 are compared at one repeatability."""
 MAX_CAUSES = 5
 """Causes, far from the data, of which all forms are fitted."""
-MIN_COUNT = 6
-"""Forms that are refitted whatever their expected gain."""
+MIN_COUNT, MIN_DEAR = 6, 3
+"""Forms that are refitted whatever their expected gain, and of models whose runs are dear."""
 
 
 @dataclass(frozen=True)
@@ -155,6 +160,7 @@ def rank_causes(
     causes: Sequence[Cause],
     workers: int,
     most: int,
+    bank: Sequence[Template] | None = None,
 ) -> list[Candidate]:
     """Return the causes by evidence above a base's, best first.
 
@@ -175,6 +181,8 @@ def rank_causes(
         Processes, -1 for one a core.
     most : int
         Largest number of forms that are refitted, the most promising ones.
+    bank : sequence of Template, optional
+        Templates of the causes about the base, where they are known.
     """
     unknowns = len(problem.unknowns)
     shared = base.scores.shared.copy()
@@ -186,11 +194,18 @@ def rank_causes(
     centres = [centre for centre in found if centre is not None]
     taken = {form.cause for form in base.forms}
     forms = [form for c in causes if c.name not in taken for form in c.forms]
+    if problem.dear:
+        if bank is None:
+            bank = cause_templates(problem, layouts, base, named_forms(causes), workers)
+        misfit = solve(centres[-1], centres[-1].residuals, 1.0)[1]
+        samples = sum(r.size for r in centres[-1].residuals)
+        forms = shortlist(centres[-1], weight_of(samples, misfit), bank, forms)
     scans = run_jobs(partial(survey, problem, layouts, base.forms, centres, scan), forms, workers)
     seen = sorted((s for s in scans if s is not None), key=lambda s: s.misfit)
     best = max((s.promise for s in seen), default=0.0)
+    least = MIN_DEAR if problem.dear else MIN_COUNT
     promising = [
-        s for k, s in enumerate(seen[:most]) if k < MIN_COUNT or may_win(s, seen[0].misfit, best)
+        s for k, s in enumerate(seen[:most]) if k < least or may_win(s, seen[0].misfit, best)
     ]
     # Far from the data one form of a cause may start badly and end best.
     chosen = list(dict.fromkeys(s.form.cause for s in promising))[:MAX_CAUSES]
@@ -202,9 +217,9 @@ def rank_causes(
     ]
     first = run_jobs(partial(approach, problem, layouts, base.forms), promising, workers)
     reached = [found for found in first if found is not None]
-    least = min((found.misfit for found in reached), default=0.0)
+    lowest = min((found.misfit for found in reached), default=0.0)
     # Forms far behind the best are pruned before their repeatability is re-estimated.
-    kept = [found for found in reached if found.misfit < PRUNING_RATIO * least + CLOSE]
+    kept = [found for found in reached if found.misfit < PRUNING_RATIO * lowest + CLOSE]
     settled = run_jobs(partial(settle, problem, layouts), kept, workers)
     top = max([base, *settled], key=lambda fitted: fitted.log_evidence)
     behind = max(FAR_BEHIND, HALF * (top.log_evidence - base.log_evidence))

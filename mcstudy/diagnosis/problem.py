@@ -6,7 +6,7 @@ parameter cannot leave its range.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -208,10 +208,15 @@ class Cause:
 
 @dataclass(frozen=True)
 class Observation:
-    """Outputs of a simulated test: (time, values) by signal, values by scalar."""
+    """Outputs of a simulated test: (time, values) by signal, values by scalar.
+
+    ``widening`` holds the factors on the standard deviation of scalars that scatter more, or less,
+    than the measured data state, by name.
+    """
 
     signals: Mapping[str, tuple[Array, Array]]
     scalars: Mapping[str, float]
+    widening: Mapping[str, float] = field(default_factory=dict)
 
 
 class Simulate(Protocol):
@@ -225,9 +230,13 @@ class Simulate(Protocol):
 
 @dataclass(frozen=True)
 class Problem:
-    """Tests, unknowns that they share, the model, and the inputs' valid ranges."""
+    """Tests, unknowns that they share, the model, and the inputs' valid ranges.
+
+    ``dear`` says whether a run takes so long that fewer forms of causes are tried.
+    """
 
     tests: tuple[Test, ...]
     unknowns: tuple[Unknown, ...]
     simulate: Simulate
     ranges: Mapping[str, tuple[float, float]]
+    dear: bool = False

@@ -212,7 +212,7 @@ def search(
     if not screening.alarm and not is_at_bound(base.scatter):
         return empty
     tell("the model is inadequate: fitting the causes")
-    candidates = rank_causes(problem, layouts, base, causes, workers, SINGLES)
+    candidates = rank_causes(problem, layouts, base, causes, workers, SINGLES, bank)
     return _judge(problem, causes, empty, tuple(candidates), workers, tell)
 
 

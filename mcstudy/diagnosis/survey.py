@@ -11,6 +11,7 @@ from mcstudy.diagnosis.layout import Layout, Scatter
 from mcstudy.diagnosis.linear_model import Centre, solve
 from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Form, Problem
+from mcstudy.diagnosis.shortlist import drop_of_parabola
 from mcstudy.diagnosis.templates import score_grid
 
 Array = NDArray[np.float64]
@@ -48,6 +49,19 @@ def scan_scatter(base: Fit) -> Scatter:
         for size, most in ((base.scatter.level, SCAN.level), (base.scatter.shape, SCAN.shape))
     )
     return Scatter(level, shape)
+
+
+def weight_of(samples: int, misfit: float) -> float:
+    """Return the weight of the data at which a misfit is as large as that of noise.
+
+    Parameters
+    ----------
+    samples : int
+        Number of the data.
+    misfit : float
+        Negative log posterior.
+    """
+    return min(1.0, float(np.sqrt(0.5 * samples / misfit)))
 
 
 @dataclass(frozen=True)
@@ -111,7 +125,7 @@ def survey(
     times = len(layouts) / len(chosen)
     samples = sum(r.size for r in few[0].residuals)
     misfits = [solve(centre, centre.residuals, 1.0)[1] for centre in few]
-    weight = min(1.0, float(np.sqrt(0.5 * samples / min(misfits))))
+    weight = weight_of(samples, min(misfits))
     if weight >= FAR:
         # Near the data the better of the points is enough.
         k = int(np.argmin(misfits))
@@ -132,7 +146,7 @@ def survey(
                 changes = max(changes, float(np.sum((found - before) ** 2)))
             solved, misfit = solve(centre, residuals, weight)
             halfway = [0.5 * (r + b) for r, b in zip(residuals, centre.residuals, strict=True)]
-            gain = _gain(without, solve(centre, halfway, weight)[1], misfit)
+            gain = drop_of_parabola(without, solve(centre, halfway, weight)[1], misfit)
             expected = min(expected, without - gain)
             shared = np.clip(solved.shared, -MAX_START, MAX_START)
             own = list(whole.scores.own)
@@ -166,13 +180,6 @@ def _spread(layouts: Sequence[Layout]) -> list[int]:
     places = np.linspace(0.0, 1.0, SURVEYED) ** DENSER
     ranks = np.unique((places * (len(layouts) - 1)).round().astype(int))
     return sorted(int(i) for i in np.argsort(heights)[ranks])
-
-
-def _gain(none: float, half: float, whole: float) -> float:
-    """Return the drop of a parabola through the loss at none, half and all of a change."""
-    curvature = 2.0 * (none + whole - 2.0 * half)
-    slope = whole - none - curvature
-    return slope**2 / (4.0 * curvature) if slope < 0.0 < curvature else 0.0
 
 
 def may_win(surveyed: Survey, misfit: float, promise: float) -> bool:

@@ -159,7 +159,7 @@ def change_of(
     if found is None:
         return None
     return tuple(
-        layout.whitened(seen, own) - layout.whitened(before, own)
+        (layout.whitened(seen, own) - layout.whitened(before, own)) / layout.widths(before)
         for layout, seen, before, own in zip(
             layouts, found, fitted.observations, fitted.scores.own, strict=True
         )

@@ -32,7 +32,9 @@ from studies.diagnosis.emulator import (
     Surface,
     change_terms,
     fit_terms,
+    fit_widening,
     quadratic_terms,
+    widening_terms,
 )
 from studies.diagnosis.model_choice import ModelChoice
 from studies.monte_carlo.schema import MonteCarloStudy
@@ -198,7 +200,7 @@ def fit_surfaces(
         changes = []
         forms = [form for cause in causes for form in cause.forms]
         for k, form in enumerate(follow(forms, "forms of causes", quiet=quiet)):
-            change = _change_of(choice, form, draws, base, points, outputs, seed + k, model)
+            change = _change_of(choice, form, draws, base, surface, outputs, seed + k, model)
             if change is not None:
                 changes.append(change)
     spread = dict(zip(outputs, scatter.tolist(), strict=True))
@@ -323,7 +325,7 @@ def _change_of(
     form: Form,
     draws: _Draws,
     base: Array,
-    points: Array,
+    surface: Surface,
     outputs: Sequence[str],
     seed: int,
     model: Model,
@@ -345,12 +347,24 @@ def _change_of(
     centred = all(
         np.isclose(value_at(p.prior, 0.0), p.none, rtol=1e-9, atol=1e-12) for p in form.free
     )
-    terms = change_terms(scores, points[:PAIRED], centred=centred)
+    points = surface.scaling.points({name: v[:PAIRED] for name, v in draws.columns.items()})
+    terms = change_terms(scores, points, centred=centred)
     coefficients, _ = fit_terms(terms, changed)
     # An output that never changes must get no change from the scatter of the fit.
     still = ~np.any(np.abs(np.nan_to_num(changed)) > 0.0, axis=0)
     coefficients[:, still] = 0.0
-    return Change(form, centred, coefficients)
+    before = base[:PAIRED] - quadratic_terms(points) @ surface.coefficients
+    after = before + changed - terms @ coefficients
+    widening = [
+        fit_widening(widening_terms(scores), _without_outlying(own), _without_outlying(new))
+        for own, new in zip(before.T, after.T, strict=True)
+    ]
+    return Change(form, centred, coefficients, np.stack(widening, axis=1))
+
+
+def _without_outlying(values: Array) -> Array:
+    """Return values with outlying ones as NaN."""
+    return np.where(_is_outlying(values), np.nan, values)
 
 
 def _rescaled(test: Test, scatter: Mapping[str, float]) -> Test:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.stats import chi2
 
 from mcstudy.diagnosis.problem import Form, Observation
 from mcstudy.studyfile.input_space import value_at
@@ -19,6 +21,14 @@ CUBIC, MOST_TERMS = 3, 40
 """Degree of the change by a cause, and the largest number of its terms."""
 GRID = np.linspace(-4.0, 4.0, 161)
 """Standard-normal latents at which a prior's quantile is inverted."""
+SHRINKAGE = 0.5
+"""Prior standard deviation of a coefficient of a logarithm of a factor on scatter (assumed)."""
+SIGNIFICANT = 0.001
+"""p-value of a likelihood ratio from which on a scatter counts as grown."""
+WIDEST = 4.0
+"""Largest factor on the scatter, and the inverse of the least."""
+MOST_LOG = 10.0
+"""Bound of a logarithm of a scatter during its fit."""
 
 
 @dataclass(frozen=True)
@@ -76,11 +86,14 @@ class Change:
         Whether the change is zero at latents of zero.
     coefficients : (terms, outputs) array
         Of the terms by ``change_terms``.
+    widening : (terms, outputs) array
+        Coefficients of the logarithm of the factor on the scatter, of ``widening_terms``.
     """
 
     form: Form
     centred: bool
     coefficients: Array
+    widening: Array
 
     @functools.cached_property
     def _grids(self) -> dict[str, Array]:
@@ -138,14 +151,22 @@ class Emulator:
         given = {name: np.array([inputs[name]]) for name in self._surface.scaling.names}
         point = self._surface.scaling.points(given)
         values = quadratic_terms(point)[0] @ self._surface.coefficients
+        log_factors = np.zeros(len(self.outputs))
         for cause, parameters in effects.items():
             change = self._change(cause, parameters)
             if change is not None:
                 scores = change.scores(parameters)
                 terms = change_terms(scores[None], point, centred=change.centred)
                 values = values + terms[0] @ change.coefficients
-        by_name = dict(zip(self.outputs, values, strict=True))
-        return Observation({}, {name: float(by_name[name]) for name in self._wanted})
+                log_factors += widening_terms(scores[None])[0] @ change.widening
+        most = np.log(WIDEST)
+        factors = np.exp(np.clip(log_factors, -most, most))
+        found = dict(zip(self.outputs, zip(values, factors, strict=True), strict=True))
+        return Observation(
+            {},
+            {name: float(found[name][0]) for name in self._wanted},
+            {name: float(found[name][1]) for name in self._wanted if found[name][1] != 1.0},
+        )
 
     def _change(self, cause: str, parameters: Mapping[str, float]) -> Change | None:
         for change in self._changes:
@@ -213,3 +234,49 @@ def fit_terms(terms: Array, outputs: Array) -> tuple[Array, Array]:
         coefficients[:, k] = np.linalg.solve(square, part.T @ outputs[good, k])
         left[good, k] = outputs[good, k] - part @ coefficients[:, k]
     return coefficients, left
+
+
+def widening_terms(scores: Array) -> Array:
+    """Return the terms (n, 1 + 2 k) of a logarithm of a factor on scatter: latents, squares."""
+    return np.concatenate([np.ones((len(scores), 1)), scores, scores**2], axis=1)
+
+
+def fit_widening(terms: Array, before: Array, after: Array) -> Array:
+    """Return the coefficients (terms,) of the logarithm of the growth of a scatter.
+
+    The most probable ones for normal deviations of the same runs with and without a change: where
+    both share their deviations, their errors cancel. Zero unless the growth is significant.
+
+    Parameters
+    ----------
+    terms : (n, terms) array
+        From ``widening_terms``.
+    before, after : (n,) array
+        Deviations without and with the change, NaN where a run failed.
+    """
+    known = np.isfinite(before) & np.isfinite(after)
+    terms, before, after = terms[known], before[known], after[known]
+    size = float(np.sqrt(np.mean(before**2)))
+    if size == 0.0:
+        return np.zeros(terms.shape[1])
+    own, grown = _log_scatter(terms, before / size), _log_scatter(terms, after / size)
+    gained = _cost(own, terms, after / size)[0] - _cost(grown, terms, after / size)[0]
+    if gained < 0.5 * chi2.isf(SIGNIFICANT, terms.shape[1]):
+        return np.zeros(terms.shape[1])
+    return grown - own
+
+
+def _log_scatter(terms: Array, deviations: Array) -> Array:
+    """Return the most probable coefficients of the logarithm of a standard deviation."""
+    start = np.zeros(terms.shape[1])
+    return np.asarray(minimize(_cost, start, (terms, deviations), "BFGS", jac=True).x)
+
+
+def _cost(coefficients: Array, terms: Array, deviations: Array) -> tuple[float, Array]:
+    """Return the negative log posterior of deviations, up to a constant, and its gradient."""
+    logs = terms @ coefficients
+    squares = (deviations * np.exp(-np.clip(logs, -MOST_LOG, MOST_LOG))) ** 2
+    # The level itself has a flat prior.
+    shrunk = np.concatenate([[0.0], coefficients[1:]]) / SHRINKAGE**2
+    cost = float(np.sum(logs) + 0.5 * np.sum(squares) + 0.5 * shrunk @ coefficients)
+    return cost, np.asarray(terms.T @ (1.0 - squares) + shrunk)

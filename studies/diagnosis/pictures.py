@@ -62,8 +62,9 @@ def _predicted(problem: Problem, layouts: Sequence[Layout], fitted: Fit) -> Pred
     found = []
     for i, (layout, zero) in enumerate(zip(layouts, own, strict=True)):
         observation = fitted.observations[i] if seen is None else seen[i]
-        spread = np.sum(fitted.own_slopes[i] ** 2, axis=1)
-        slopes = fitted.shared_slopes[i]
+        widths = layout.widths(fitted.observations[i])[:, None]
+        spread = np.sum((widths * fitted.own_slopes[i]) ** 2, axis=1)
+        slopes = widths * fitted.shared_slopes[i]
         spread += np.einsum("np,pq,nq->n", slopes, fitted.covariance, slopes)
         found.append((layout.whitened(observation, zero), np.sqrt(spread)))
     return found

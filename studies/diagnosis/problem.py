@@ -31,6 +31,8 @@ SIZEABLE = 0.05
 """Share of the peak above which a sample is sizeable."""
 MIN_COUNT = 3
 """Minimum number of tests of a diagnosis."""
+DEAR = 0.01
+"""CPU time (s) of a run above which fewer forms of causes are tried."""
 
 
 def build_problem(data: Measured, choice: ModelChoice, simulation: Simulation) -> Problem:
@@ -80,6 +82,7 @@ def build_problem(data: Measured, choice: ModelChoice, simulation: Simulation) -
         ),
         simulate=simulation,
         ranges={name: (item.low, item.high) for name, item in inputs.items()},
+        dear=model.cost > DEAR,
     )
 
 

@@ -4,7 +4,7 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -202,7 +202,7 @@ def _assess(
     trial: FullScaleTrial, hidden: Sequence[Hidden], problem: Problem, causes: Sequence[Cause]
 ) -> FullScaleOutcome:
     counter = _Counter(problem.simulate)
-    problem = Problem(problem.tests, problem.unknowns, counter, problem.ranges)
+    problem = replace(problem, simulate=counter)
     start = time.perf_counter()
     finding = search(problem, causes)
     seconds = time.perf_counter() - start

@@ -300,6 +300,22 @@ def residuals_at(
     )
 
 
+def log_widening(layouts: Sequence[Layout], seen: Sequence[Observation]) -> float:
+    """Return the sum of the logarithms of the factors on the deviations of scalars.
+
+    Parameters
+    ----------
+    layouts : sequence of Layout
+    seen : sequence of Observation
+        Simulated tests.
+    """
+    return sum(
+        float(np.log(layout.widths(observation)).sum())
+        for layout, observation in zip(layouts, seen, strict=True)
+        if observation.widening
+    )
+
+
 def _misfit(
     layouts: Sequence[Layout],
     seen: Sequence[Observation],
@@ -311,9 +327,7 @@ def _misfit(
     for layout, observation, own in zip(layouts, seen, scores.own, strict=True):
         residual = layout.residual(observation, own, scatter)
         total += weight**2 * float(residual @ residual) + float(own @ own)
-        if observation.widening:
-            total += 2.0 * weight**2 * float(np.log(layout.widths(observation)).sum())
-    return 0.5 * total
+    return 0.5 * total + weight**2 * log_widening(layouts, seen)
 
 
 def expand_tests(

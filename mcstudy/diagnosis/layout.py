@@ -83,7 +83,8 @@ class Layout:
     @functools.cached_property
     def scattering(self) -> NDArray[np.bool_]:
         """Which nuisances describe the repeatability."""
-        return np.array([name.startswith(("pulse:", "scatter:")) for name in self.names])
+        own = [name.startswith(("pulse:", "scatter:")) for name in self.names]
+        return np.array(own, dtype=bool)
 
     def scatter_sizes(self, scatter: Scatter) -> Array:
         """Return the standard deviations of the repeatability nuisances, in order."""
@@ -290,10 +291,23 @@ class Layout:
             start += channel.time.size
         return found
 
-    def unit_scalar(self, name: str) -> Array:
-        """Return the whitened vector (n,) that holds one measured scalar and zeros elsewhere."""
+    def unit_scalar(self, name: str, seen: Observation) -> Array:
+        """Return the whitened vector (n,) that holds one simulated scalar and zeros elsewhere.
+
+        A measured one would go with its own error where it scatters much.
+
+        Parameters
+        ----------
+        name : str
+            Name of the scalar.
+        seen : Observation
+            Simulated test.
+        """
         size = sum(signal.time.size for signal in self.test.signals)
-        own = [s.value / s.sd if s.name == name else 0.0 for s in self.test.scalars]
+        own = [
+            seen.scalars[name] / (s.sd * seen.widening.get(name, 1.0)) if s.name == name else 0.0
+            for s in self.test.scalars
+        ]
         return np.concatenate([np.zeros(size), own])
 
     def _assemble(

@@ -75,7 +75,8 @@ def locate_misfit(fitted: Fit, layouts: Sequence[Layout]) -> Where:
         for scalar in test.scalars:
             names.append((scalar.name, -1, group))
             for i, layout in enumerate(layouts):
-                columns[i].append(SIZE * inside[i] * layout.unit_scalar(scalar.name))
+                unit = layout.unit_scalar(scalar.name, fitted.observations[i])
+                columns[i].append(SIZE * inside[i] * unit)
     marginal = Marginal(fitted, layouts, [np.stack(part, axis=1) for part in columns])
     reduced = marginal.reduce(marginal.measured(), fitted.scatter)
     information = np.maximum(np.diag(reduced.information), 1e-12)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.fit import Fit, FitError, Slopes, fit, residuals_at
+from mcstudy.diagnosis.fit import Fit, FitError, Slopes, fit, log_widening, observe_tests
 from mcstudy.diagnosis.layout import Layout, Scatter
 from mcstudy.diagnosis.linear_model import Centre, solve
 from mcstudy.diagnosis.normal_equations import Scores
@@ -37,7 +37,8 @@ STAGE_STEPS = 6
 """Steps of a first fit."""
 SURVEYED = 10
 """Tests on which forms are surveyed: spread over the largest measured values, the upper half of
-them more densely, where clearances, plateaus and saturation begin."""
+them more densely, where clearances, plateaus and saturation begin. Tests without signals, whose
+scalars scatter, are surveyed all."""
 DENSER = 0.6
 """Exponent of the ranks of these tests."""
 
@@ -139,14 +140,21 @@ def survey(
         tried: list[tuple[float, Scores]] = []
         for scores in score_grid(form, fine=weight < FAR):
             start = Scores(np.concatenate([centre.scores.shared, scores]), centre.scores.own)
-            residuals = residuals_at(part, places, (*forms, form), start, scatter)
-            if residuals is None:
+            seen = observe_tests(part, (*forms, form), places, start)
+            if seen is None:
                 continue
+            residuals = [
+                place.residual(observation, own, scatter)
+                for place, observation, own in zip(places, seen, start.own, strict=True)
+            ]
+            wider = weight**2 * log_widening(places, seen)
             for found, before in zip(residuals, centre.residuals, strict=True):
                 changes = max(changes, float(np.sum((found - before) ** 2)))
             solved, misfit = solve(centre, residuals, weight)
+            misfit += wider
             halfway = [0.5 * (r + b) for r, b in zip(residuals, centre.residuals, strict=True)]
-            gain = drop_of_parabola(without, solve(centre, halfway, weight)[1], misfit)
+            half = solve(centre, halfway, weight)[1] + 0.5 * wider
+            gain = drop_of_parabola(without, half, misfit)
             expected = min(expected, without - gain)
             shared = np.clip(solved.shared, -MAX_START, MAX_START)
             own = list(whole.scores.own)
@@ -171,11 +179,10 @@ def survey(
 
 def _spread(layouts: Sequence[Layout]) -> list[int]:
     """Return the tests of a survey, in order."""
-    if len(layouts) <= SURVEYED:
+    if len(layouts) <= SURVEYED or not layouts[0].test.signals:
         return list(range(len(layouts)))
     heights = [
-        max((float(np.abs(s.values).max()) for s in layout.test.signals), default=float(i))
-        for i, layout in enumerate(layouts)
+        max(float(np.abs(s.values).max()) for s in layout.test.signals) for layout in layouts
     ]
     places = np.linspace(0.0, 1.0, SURVEYED) ** DENSER
     ranks = np.unique((places * (len(layouts) - 1)).round().astype(int))

@@ -260,7 +260,8 @@ def _discrepancy(
         for scalar in test.scalars if shaped else ():
             names.append(f"{scalar.name} x {factor_name}")
             for i, layout in enumerate(layouts):
-                columns[i].append(SIZE * factor[i] * layout.unit_scalar(scalar.name))
+                unit = layout.unit_scalar(scalar.name, fitted.observations[i])
+                columns[i].append(SIZE * factor[i] * unit)
     return _stack(names, columns, fitted)
 
 

@@ -78,12 +78,15 @@ class Parameter:
         Null value, at which the effect vanishes.
     models : tuple of str
         Models that have the parameter; the others run at its nominal value.
+    in_accidents : Prior
+        Prior where the recorded values were estimated after an accident, not measured in a test.
     """
 
     input: Input
     prior: Prior
     none: float
     models: tuple[str, ...]
+    in_accidents: Prior
 
 
 @dataclass(frozen=True)

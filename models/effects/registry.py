@@ -96,7 +96,7 @@ def _fixed(form: dict[str, Any], parameters: dict[str, Any]) -> dict[str, float]
 
 
 def _parameter(name: str, row: dict[str, Any], models: tuple[str, ...]) -> Parameter:
-    prior = Prior(row["prior"][0], float(row["prior"][1]), float(row["prior"][2]))
+    prior = _prior(row["prior"])
     low, high = (float(v) for v in row["range"])
     item = Input(
         name=name,
@@ -107,4 +107,14 @@ def _parameter(name: str, row: dict[str, Any], models: tuple[str, ...]) -> Param
         high=high,
         source="prior of the effect",
     )
-    return Parameter(item, prior, float(row["none"]), tuple(row.get("models", models)))
+    return Parameter(
+        item,
+        prior,
+        float(row["none"]),
+        tuple(row.get("models", models)),
+        _prior(row.get("prior_in_accidents", row["prior"])),
+    )
+
+
+def _prior(row: list[Any]) -> Prior:
+    return Prior(row[0], float(row[1]), float(row[2]))

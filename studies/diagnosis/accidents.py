@@ -45,7 +45,7 @@ Array = NDArray[np.float64]
 POOL, PAIRED = 1920, 240
 """Runs of the base model, and of each form of a cause: the surfaces err by a tenth of the scatter
 of single accidents, which sixty of them do not see."""
-MAX_SCORE = 2.5
+MAX_SCORE = 3.0
 """Largest standard-normal latent of the sampled sizes of causes."""
 MAX_FAILED = 0.2
 """Maximum share of failed runs."""

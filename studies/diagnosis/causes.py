@@ -20,7 +20,9 @@ FREE_FORM = "free_form"
 """Name of the forms that are tables over a cause's own coordinate."""
 
 
-def causes_of(name: str, options: Mapping[str, Any] | None = None) -> tuple[Cause, ...]:
+def causes_of(
+    name: str, options: Mapping[str, Any] | None = None, *, accidents: bool = False
+) -> tuple[Cause, ...]:
     """Return the causes that apply to a model.
 
     Parameters
@@ -29,11 +31,27 @@ def causes_of(name: str, options: Mapping[str, Any] | None = None) -> tuple[Caus
         Name of the model.
     options : mapping, optional
         Its options.
+    accidents : bool
+        Whether the recorded values were estimated after an accident, not measured in a test.
     """
     model = load_model(name, options or {})
     everything = load_model(name, options or {}, {effect: {} for effect in model.effects})
     inputs = frozenset(item.name for item in everything.inputs)
-    return tuple(_cause(load_effect(effect), inputs) for effect in model.effects)
+    return tuple(_cause(load_effect(effect), inputs, accidents) for effect in model.effects)
+
+
+def accident_causes_of(name: str, options: Mapping[str, Any] | None = None) -> tuple[Cause, ...]:
+    """Return the causes of a model that accidents show: nothing was recorded with instruments.
+
+    Parameters
+    ----------
+    name : str
+        Name of the model.
+    options : mapping, optional
+        Its options.
+    """
+    causes = causes_of(name, options, accidents=True)
+    return tuple(cause for cause in causes if stage_of(cause.name) != "signal")
 
 
 def stage_of(cause: str) -> str:
@@ -41,7 +59,7 @@ def stage_of(cause: str) -> str:
     return load_effect(cause).stage
 
 
-def _cause(effect: Effect, inputs: frozenset[str]) -> Cause:
+def _cause(effect: Effect, inputs: frozenset[str], accidents: bool) -> Cause:
     """Return an effect as a cause of a model with all its effects' parameters among the inputs."""
     held = [name for name in effect.parameters if effect.input_name(name) in inputs]
     forms = tuple(
@@ -49,7 +67,7 @@ def _cause(effect: Effect, inputs: frozenset[str]) -> Cause:
             cause=effect.name,
             name=form,
             fixed={name: value for name, value in fixed.items() if name in held},
-            free=tuple(_parameter(effect, name) for name in held if name not in fixed),
+            free=tuple(_parameter(effect, name, accidents) for name in held if name not in fixed),
             named=form != FREE_FORM,
         )
         for form, fixed in effect.forms.items()
@@ -68,11 +86,12 @@ def _cause(effect: Effect, inputs: frozenset[str]) -> Cause:
     )
 
 
-def _parameter(effect: Effect, name: str) -> Parameter:
+def _parameter(effect: Effect, name: str, accidents: bool) -> Parameter:
     entry = effect.parameters[name]
     item = entry.input
-    prior = InputSpace({name: EffectPrior(entry.prior, item)}, {name: item.unit})
-    return Parameter(name, item.unit, item.meaning, prior, entry.none, entry.prior.distribution)
+    given = entry.in_accidents if accidents else entry.prior
+    prior = InputSpace({name: EffectPrior(given, item)}, {name: item.unit})
+    return Parameter(name, item.unit, item.meaning, prior, entry.none, given.distribution)
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from mcstudy.measurement.measured_data import Measured, load_measured
 from models.criteria import head_injury_criterion
 from studies.diagnosis import conclusions, extension, pictures
 from studies.diagnosis.accidents import fit_surfaces, is_collection
-from studies.diagnosis.causes import causes_of, stage_of
+from studies.diagnosis.causes import accident_causes_of, causes_of
 from studies.diagnosis.emulator import Emulator
 from studies.diagnosis.extras import extras_of
 from studies.diagnosis.model_choice import ModelChoice, choose_model
@@ -88,18 +88,18 @@ def diagnose(
     choice = choose_model(data, model_config)
     simulation = simulation_of(data, choice)
     problem = build_problem(data, choice, simulation)
-    catalogue = causes_of(choice.name, choice.options)
+    accidents = is_collection(data)
+    catalogue = (accident_causes_of if accidents else causes_of)(choice.name, choice.options)
     causes = tuple(cause for cause in catalogue if cause.name not in choice.effects)
     say(f"{len(problem.tests)} tests, {len(causes)} causes", quiet=quiet)
     source_of_extras: Simulation | Emulator = simulation
     notes = list(note_lines(data))
-    if is_collection(data):
-        causes = tuple(c for c in causes if stage_of(c.name) != "signal")
+    if accidents:
         surfaces = fit_surfaces(
             problem, data, choice, causes, seed=seed, workers=workers, quiet=quiet
         )
-        for name, accidents in surfaces.outlying(problem).items():
-            notes.append(f"{name} left out as outlying: {', '.join(accidents)}")
+        for name, left_out in surfaces.outlying(problem).items():
+            notes.append(f"{name} left out as outlying: {', '.join(left_out)}")
         problem, source_of_extras = surfaces.problem_of(problem), surfaces.emulator
     finding = search(problem, causes, seed=seed, workers=workers, tell=partial(say, quiet=quiet))
     say(finding.why, quiet=quiet)

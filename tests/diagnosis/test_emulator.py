@@ -13,7 +13,9 @@ from studies.diagnosis.emulator import (
     Surface,
     change_terms,
     fit_terms,
+    fit_widening,
     quadratic_terms,
+    widening_terms,
 )
 
 
@@ -66,7 +68,7 @@ def test_a_change_adds_to_the_surface(centred: bool) -> None:
             Scaling(("a", "b"), np.zeros(2, bool), np.array([10.0, 5.0]), np.array([2.0, 1.0])),
             base,
         ),
-        [Change(form, centred, coefficients)], ["throw_distance"],
+        [Change(form, centred, coefficients, np.zeros((3, 1)))], ["throw_distance"],
     )  # fmt: skip
     at = np.array([[0.5, -1.0]])
     inputs = {"a": 11.0, "b": 4.0}
@@ -105,6 +107,24 @@ def test_few_parameters_have_a_cubic_change_and_many_a_quadratic_one() -> None:
     _, left = fit_terms(change_terms(z, x, centred=True), bent)
     assert np.abs(left).max() < 0.05
     assert change_terms(rng.standard_normal((120, 4)), x, centred=True).shape[1] == 4 + 10 + 8
+
+
+@pytest.mark.parametrize("growth", [0.0, 0.15])
+def test_a_scatter_that_grows_with_a_cause_is_found(growth: float) -> None:
+    """Deviations of the same runs, times exp(0.2 + growth z), beside deviations that stay."""
+    rng = np.random.default_rng(11)
+    z = rng.uniform(-3.0, 3.0, (240, 1))
+    before = 0.06 * rng.standard_normal(240)
+    before[::17] = np.nan
+    level = 0.2 if growth else 0.0
+    after = before * np.exp(level + growth * z[:, 0]) + 0.006 * rng.standard_normal(240)
+    found = fit_widening(widening_terms(z), before, after)
+    at = widening_terms(np.array([[-2.0], [0.0], [2.0]]))
+    assert at @ found == pytest.approx(
+        [level - 2.0 * growth, level, level + 2.0 * growth], abs=0.06
+    )
+    if not growth:
+        assert not found.any()
 
 
 def test_an_accident_of_another_kind_gets_no_weight_and_a_common_shift_takes_none() -> None:

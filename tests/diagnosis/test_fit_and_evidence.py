@@ -1,16 +1,19 @@
 """The fit and its evidence against dense linear algebra, on a model that is linear."""
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from linear_tests import BUMP, make_problem
-from scipy import stats
+from linear_tests import BUMP, Linear, make_problem
+from scipy import optimize, stats
 
 from mcstudy.diagnosis.fit import Fit, fit, start_scores
 from mcstudy.diagnosis.layout import Layout, Scatter, lay_out
 from mcstudy.diagnosis.marginal import Marginal, log_bayes_factor, quadratic_form
-from mcstudy.diagnosis.model_selection import rank_causes, settle
+from mcstudy.diagnosis.model_selection import examine, rank_causes, settle
 from mcstudy.diagnosis.normal_equations import Scores
-from mcstudy.diagnosis.problem import Problem
+from mcstudy.diagnosis.problem import Observation, Problem, Scalar, Test
 from mcstudy.diagnosis.search import UNEXPLAINED, fit_base, search
 
 SCATTER = Scatter(0.01, 0.003)
@@ -160,3 +163,80 @@ def test_scores_stay_where_a_quantile_can_follow() -> None:
     assert np.all(np.abs(base.scores.shared) <= 8.0)
     assert isinstance(base.scores, Scores)
     assert len(layouts) == len(problem.tests)
+
+
+class Scattered:
+    """One throw a test, N(0, 1); the effect ``loose`` scatters it, ``shifted`` moves it."""
+
+    def __init__(self, widen: bool) -> None:
+        self.widen = widen
+
+    def __call__(
+        self, _inputs: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]
+    ) -> Observation:
+        size = effects["bump"]["size"] if "bump" in effects else 0.0
+        return Observation({}, {"throw": size}, {"throw": np.exp(size)} if self.widen else {})
+
+
+@pytest.mark.parametrize("widen", [True, False])
+def test_a_cause_may_widen_the_scatter_of_scalars(widen: bool) -> None:
+    """Sixty values N(1, e): the cause that widens explains them, the mere shift leaves structure.
+
+    The most probable size minimises the sum of squares over exp(2 s), with 60 s and s^2 / 2 added.
+    """
+    values = 1.0 + np.e * stats.norm.ppf((np.arange(60) + 0.5) / 60)
+    np.random.default_rng(2).shuffle(values)
+    tests = tuple(
+        Test(f"t{k}", {}, {}, (), (Scalar("throw", v, 1.0, scatters=False),), (),
+             {"order": float(k)})
+        for k, v in enumerate(values)
+    )  # fmt: skip
+    problem = Problem(tests, (), Scattered(widen), {})
+    layouts, base = fit_base(problem)
+    best = rank_causes(problem, layouts, base, [BUMP], 1, 5)[0]
+    if widen:
+
+        def cost(s: float) -> float:
+            return 0.5 * float(np.sum((values - s) ** 2)) * np.exp(-2 * s) + 60 * s + s * s / 2
+
+        exact = optimize.minimize_scalar(cost, bounds=(-1.0, 3.0), method="bounded")
+        assert best.fitted.misfit == pytest.approx(exact.fun, abs=0.5)
+        assert best.fitted.scores.shared[0] == pytest.approx(exact.x, abs=0.1)
+    p_value = examine(problem, layouts, best.fitted, best.log_evidence).p_value
+    assert (p_value > 0.05) == widen
+
+
+class Counted(Linear):
+    """The linear model with a counter, and causes that change nothing like the bump."""
+
+    runs = 0
+
+    def __call__(
+        self, inputs: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]
+    ) -> Observation | None:
+        Counted.runs += 1
+        found = super().__call__(inputs, effects)
+        assert found is not None
+        time, values = found.signals["head_acceleration"]
+        for name, parameters in effects.items():
+            if name.startswith("other"):
+                place = -0.002 + 0.001 * int(name[5:])
+                early = np.exp(-0.5 * ((time - place) / 0.0004) ** 2)
+                values = values + parameters["size"] * early
+        return Observation({"head_acceleration": (time, values)}, {})
+
+
+def test_a_dear_model_takes_fewer_runs_to_the_same_answer() -> None:
+    others = [
+        replace(BUMP, name=f"other{k}", forms=(replace(BUMP.forms[0], cause=f"other{k}"),))
+        for k in range(10)
+    ]
+    whole = replace(make_problem(7, bump=1.0), simulate=Counted())
+    runs, answers = [], []
+    for dear in (False, True):
+        Counted.runs = 0
+        found = search(replace(whole, dear=dear), [*others, BUMP])
+        runs.append(Counted.runs)
+        answers.append((found.cause, found.ambiguous, found.second))
+    assert answers == [("bump", (), None)] * 2
+    assert runs[1] < 0.9 * runs[0]

@@ -18,7 +18,7 @@ from mcstudy.execution.workers import run_jobs
 from mcstudy.report import Section, Table
 from mcstudy.text import number
 from studies.diagnosis.accidents import Surfaces, fit_surfaces
-from studies.diagnosis.causes import causes_of, stage_of
+from studies.diagnosis.causes import accident_causes_of, causes_of
 from studies.diagnosis.posterior import describe
 from studies.publishing import publish
 from studies.validation.diagnosis.drawing import ACCIDENTS, CRASHES, draw_of
@@ -149,8 +149,7 @@ def run_accidents(trials: Sequence[FullScaleTrial], study_file: Path) -> list[Fu
             folder = Path(scratch) / "tests"
             make_accidents(folder, study_file, hidden, trial.seed)
             problem, data, choice = read_tests(folder, study_file)
-            causes = causes_of(choice.name, choice.options)
-            causes = tuple(cause for cause in causes if stage_of(cause.name) != "signal")
+            causes = accident_causes_of(choice.name, choice.options)
             if surfaces is None:
                 surfaces = fit_surfaces(
                     problem, data, choice, causes, seed=trial.seed, workers=1, quiet=True

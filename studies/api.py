@@ -19,6 +19,8 @@ from mcstudy.report import Table
 from mcstudy.studyfile.schema import AnyStudy, CommonStudy
 from models.protocol import Run
 from studies.kinds import KINDS, load_study, parse_study
+from studies.method_comparison.schema import MethodComparison
+from studies.method_comparison.study import compare_methods, summarise_methods
 from studies.published_tables import PublishedTable
 from studies.reconstruction.schema import Reconstruction
 from studies.reconstruction.study import reconstruct, write_reconstruction
@@ -38,7 +40,7 @@ def run_study(
     workers: Workers = -1,
     quiet: bool = True,
 ) -> ResultsFolder:
-    """Run a study file of any sampled kind, or resume it where it stopped.
+    """Run a study file of any sampled kind, or resume it where it stopped; or compare methods.
 
     Parameters
     ----------
@@ -65,9 +67,14 @@ def run_study(
     """
     text = read_study_text(path)
     study = parse_study(text, str(path))
+    folder = results_folder(study, out)
+    if isinstance(study, MethodComparison):
+        if isinstance(workers, str):
+            raise UserError(f"{path}: a {study.kind} has one run a method; leave --cluster out")
+        compare_methods(study, text, folder, workers=workers, quiet=quiet)
+        return folder
     if study.kind not in KINDS:
         raise UserError(f"{path}: kind {study.kind!r} is run by 'mcstudy reconstruct'")
-    folder = results_folder(study, out)
     KINDS[study.kind].run(study, text, folder, workers=workers, quiet=quiet)
     return folder
 
@@ -82,14 +89,18 @@ def build_report(folder: ResultsFolder) -> dict[str, Any]:
     """
     study = load_study(folder.path / "study.toml")
     if study.kind not in KINDS:
-        raise UserError(f"{folder.path}: a {study.kind} is drawn again by 'mcstudy reconstruct'")
+        verb = "run" if isinstance(study, MethodComparison) else "reconstruct"
+        raise UserError(f"{folder.path}: a {study.kind} is drawn again by 'mcstudy {verb}'")
     KINDS[study.kind].build_report(study, folder)
     return folder.read_json(ANALYSIS)
 
 
 def summarise(folder: ResultsFolder) -> list[str | Table]:
     """Return the analysis of a study's folder in a few paragraphs and tables."""
-    kind = KINDS[load_study(folder.path / "study.toml").kind]
+    study = load_study(folder.path / "study.toml")
+    if isinstance(study, MethodComparison):
+        return list(summarise_methods(study, folder))
+    kind = KINDS[study.kind]
     analysis = folder.read_analysis(kind.analysis)
     counts = ", ".join(f"{n} {status}" for status, n in analysis.status.items())
     return [*kind.summarise(analysis), f"{analysis.runs} runs: {counts}"]

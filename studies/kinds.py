@@ -12,6 +12,7 @@ from mcstudy.studyfile.reading import check_study
 from mcstudy.studyfile.schema import AnyStudy
 from studies.injury.study import Injury
 from studies.kind import StudyKind
+from studies.method_comparison.schema import MethodComparison
 from studies.model_comparison.study import Comparison
 from studies.monte_carlo.study import MonteCarlo
 from studies.morris.study import Morris
@@ -34,7 +35,7 @@ KINDS: dict[str, StudyKind[Any, Any, Any, Any]] = {
 }
 """A new kind of study is its folder and one line here."""
 
-_SCHEMAS = [*(kind.schema for kind in KINDS.values()), Reconstruction]
+_SCHEMAS = [*(kind.schema for kind in KINDS.values()), Reconstruction, MethodComparison]
 _ANY_SCHEMA: Any = Annotated[reduce(or_, _SCHEMAS), Field(discriminator="kind")]
 _ANY: TypeAdapter[AnyStudy] = TypeAdapter(_ANY_SCHEMA)
 

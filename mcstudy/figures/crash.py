@@ -179,20 +179,37 @@ def _draw_car_plan(axes: Axes, scene: SceneLike, frame: int) -> None:
 
 def draw_strip(scene: SceneLike, times: Sequence[float]) -> Figure:
     """Return side views at the given times (s) in the car's frame, left limbs orange."""
+    return draw_strips({"": scene}, times)
+
+
+def draw_strips(scenes: Mapping[str, SceneLike], times: Sequence[float]) -> Figure:
+    """Return the side views of several scenes, one row each, at the same times.
+
+    In the car's frame, left limbs orange.
+
+    Parameters
+    ----------
+    scenes : mapping
+        Scenes by the label of their row.
+    times : sequence of float
+        s.
+    """
     with style.styled():
-        figure = style.new_figure(2.75 * len(times), 3.0)
-        row = figure.subplots(1, len(times), sharey=True, squeeze=False)[0]
-        for axes, time in zip(row, times, strict=True):
-            frame = int(np.argmin(np.abs(scene.time - time)))
-            car = (float(scene.car[frame, 0]), 0.0)
-            _draw_meshes(axes, scene, frame, (0, 2), car)
-            _draw_car_side(axes, scene, 0.0)
-            _draw_body(axes, scene, frame, (0, 2), car)
-            axes.axhline(0.0, color="#333333", linewidth=0.8)
-            axes.set(xlim=(-1.25, 0.5), ylim=(-0.05, 1.55), aspect="equal")
-            axes.set_title(f"{1e3 * scene.time[frame]:.0f} ms")
+        figure = style.new_figure(2.75 * len(times), 0.5 + 2.5 * len(scenes))
+        rows = figure.subplots(len(scenes), len(times), sharex=True, sharey=True, squeeze=False)
+        for row, (label, scene) in zip(rows, scenes.items(), strict=True):
+            for axes, time in zip(row, times, strict=True):
+                frame = int(np.argmin(np.abs(scene.time - time)))
+                car = (float(scene.car[frame, 0]), 0.0)
+                _draw_meshes(axes, scene, frame, (0, 2), car)
+                _draw_car_side(axes, scene, 0.0)
+                _draw_body(axes, scene, frame, (0, 2), car)
+                axes.axhline(0.0, color="#333333", linewidth=0.8)
+                axes.set(xlim=(-1.25, 0.5), ylim=(-0.05, 1.55), aspect="equal")
+                axes.set_title(f"{1e3 * scene.time[frame]:.0f} ms")
+            row[0].set_ylabel(f"{style.safe(label)}\nheight [m]" if label else "height [m]")
+        for axes in rows[-1]:
             axes.set_xlabel("x in the car's frame [m]")
-        row[0].set_ylabel("height [m]")
         figure.suptitle("left limbs orange, right limbs blue", fontsize=9, color=style.GREY)
         return figure
 
@@ -220,24 +237,54 @@ def draw_history(
     marks : mapping, optional
         Times (s) of vertical lines by label.
     """
+    curves = {name: (time, values) for name, values in channels.items()}
+    figure = draw_curves(curves, ylabel=ylabel, until=until)
     with style.styled():
-        figure = style.new_figure(6.4, 3.6)
-        axes = figure.subplots()
-        shown = time <= until
-        for k, (name, values) in enumerate(channels.items()):
-            axes.plot(
-                1e3 * time[shown],
-                values[shown],
-                label=style.safe(name),
-                color=style.PALETTE[k % len(style.PALETTE)],
-            )
+        axes = figure.axes[0]
         for name, at in (marks or {}).items():
             if at <= until:
                 axes.axvline(1e3 * at, color=style.GREY, linestyle="--", linewidth=1.0,
                              label=style.safe(name))  # fmt: skip
-        axes.set(xlabel="time after first contact [ms]", ylabel=ylabel, xlim=(0.0, 1e3 * until))
-        axes.set_ylim(bottom=0.0)
         if len(channels) > 1 or marks:
+            axes.legend(framealpha=0.9)
+        return figure
+
+
+def draw_curves(
+    curves: Mapping[str, tuple[Array, Array]],
+    *,
+    ylabel: str,
+    until: float,
+    since: float = 0.0,
+    points: Mapping[str, float] | None = None,
+) -> Figure:
+    """Return curves, each over its own times, against time.
+
+    Parameters
+    ----------
+    curves : mapping
+        Times (n,) in s and values (n,) by legend label.
+    ylabel : str
+        Label with unit.
+    until, since : float
+        End and begin of the time axis, s.
+    points : mapping, optional
+        Time (s) of a point on a curve, by its label.
+    """
+    with style.styled():
+        figure = style.new_figure(6.4, 3.6)
+        axes = figure.subplots()
+        for k, (name, (time, values)) in enumerate(curves.items()):
+            shown = (time >= since) & (time <= until)
+            colour = style.PALETTE[k % len(style.PALETTE)]
+            axes.plot(1e3 * time[shown], values[shown], label=style.safe(name), color=colour)
+            at = (points or {}).get(name, np.nan)
+            if since <= at <= until:
+                axes.plot(1e3 * at, np.interp(at, time, values), "o", color=colour)
+        axes.set(xlabel="time after first contact [ms]", ylabel=ylabel)
+        axes.set(xlim=(1e3 * since, 1e3 * until))
+        axes.set_ylim(bottom=0.0)
+        if len(curves) > 1:
             axes.legend(framealpha=0.9)
         return figure
 

@@ -31,7 +31,7 @@ PRIMARY = 0.12
 
 
 @dataclass(frozen=True)
-class _View:
+class View:
     """A history to draw, if a run has it: channels of a group by legend label."""
 
     group: str
@@ -40,20 +40,20 @@ class _View:
     caption: str
 
 
-_VIEWS = {
-    "head_velocity": _View(
+VIEWS = {
+    "head_velocity": View(
         "head",
         {"resultant": "velocity_relative_to_car"},
         "head velocity relative to the car [m/s]",
         "Velocity of the head's centre of gravity relative to the car.",
     ),
-    "head_acceleration": _View(
+    "head_acceleration": View(
         "head",
         {"resultant": "acceleration"},
         "head acceleration [g]",
         "Resultant acceleration of the head's centre of gravity, filtered.",
     ),
-    "head_angular_acceleration": _View(
+    "head_angular_acceleration": View(
         "head",
         {"resultant, CFC 180": "angular_acceleration"},
         "head angular acceleration [rad/s²]",
@@ -113,7 +113,7 @@ def draw(study: Reconstruction, run: Run) -> dict[str, Any]:
         dents = draw_dents(run.scene)
         if dents is not None:
             figures["dents"] = dents
-    for name, view in _VIEWS.items():
+    for name, view in VIEWS.items():
         history = run.histories.get(view.group)
         if history is None or not set(view.channels.values()) <= set(history.channels):
             continue
@@ -210,7 +210,7 @@ def _report(
     animations: dict[str, bytes],
     variants: Sequence[VariantOutcome],
 ) -> str:
-    captions = {name: view.caption for name, view in _VIEWS.items()} | {
+    captions = {name: view.caption for name, view in VIEWS.items()} | {
         "kinematics": "The body from the side, in the car's frame.",
         "dents": "Displacement of the car's shells from above: the largest, and what is left.",
         "contact_force": "Contact force of each zone of the car.",

@@ -1,0 +1,1 @@
+"""The method comparison: one case through several methods, each run once."""

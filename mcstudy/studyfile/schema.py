@@ -2,6 +2,7 @@
 
 import re
 from abc import abstractmethod
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -173,6 +174,21 @@ class SampledStudy(CommonStudy, Limits):
     @abstractmethod
     def design_topics(self) -> dict[str, Any]:
         """Return the design settings that change the numbers of a run, by topic."""
+
+
+class ModelsStudy(AnyStudy, Limits):
+    """Keys of studies that run several models, by label, with the same inputs."""
+
+    models: Annotated[Mapping[str, ModelChoice], Field(min_length=2)]
+    inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
+    dependence: Dependence = Dependence()
+    report: OutputReport = OutputReport()
+
+    @model_validator(mode="after")
+    def _plain_labels(self) -> "ModelsStudy":
+        for label in self.models:
+            check_folder_name(label, "models: ")
+        return self
 
 
 class FactorStudy(SampledStudy):

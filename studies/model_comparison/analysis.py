@@ -17,11 +17,11 @@ from mcstudy.agreement import (
     without_rounding,
 )
 from mcstudy.errors import StudyError, UserError
-from mcstudy.execution.results import check_failures, status_counts
+from mcstudy.execution.results import status_counts
 from mcstudy.sensitivity.given_data import MIN_RUNS, measure_given_data
 from mcstudy.statistics import Estimate, scale_of, varies
 from mcstudy.studyfile.study_outputs import check_outputs
-from models.protocol import Model, complete_status
+from models.protocol import Model
 from studies.model_comparison.numbers import (
     ApartRun,
     ComparedModel,
@@ -33,8 +33,7 @@ from studies.model_comparison.numbers import (
     TooFewRuns,
 )
 from studies.model_comparison.schema import ModelComparison
-from studies.paired_runs import batch_of
-from studies.runs import describe_ends
+from studies.paired_runs import batch_of, describe_models, known_values
 
 Array = NDArray[np.float64]
 
@@ -71,34 +70,19 @@ def analyse(
     StudyError
         If more runs of a model failed than the study allows, or no output can be compared.
     """
-    everything = pd.concat([part.assign(model=label) for label, part in runs.items()])
-    everything = everything.reset_index(drop=True)
-    complete = pd.Series(False, index=everything.index)
-    for label, model in models.items():
-        counts = status_counts(runs[label])
-        try:
-            check_failures(counts, set(counts) - complete_status(model), study.max_failure_rate)
-        except StudyError as error:
-            raise StudyError(f"models.{label}: {error}") from None
-        own = everything["model"] == label
-        complete |= own & everything["status"].isin(complete_status(model))
+    ended = describe_models(study, models, runs)
     first = next(iter(models))
     inputs = runs[first][list(study.inputs)]
     ignored = {
         label: {i.name: i.ignored for i in model.inputs if i.ignored and i.name in study.inputs}
         for label, model in models.items()
     }
-    words = complete_status(models[first])
-    ended = describe_ends(study, everything, complete.to_numpy(dtype=bool), words)
     compared: dict[str, ComparedOutput | TooFewRuns] = {}
     parts = batch_of(study, runs[first])
     unit_of = {item.name: item.unit for item in models[first].outputs}
     for name in outputs:
         values = pd.DataFrame(
-            {
-                label: part[name].where(part["status"].isin(complete_status(models[label]))).array
-                for label, part in runs.items()
-            }
+            {label: known_values(part, models[label], name) for label, part in runs.items()}
         )
         held = values.notna().all(axis=1).to_numpy()
         compared[name] = few = TooFewRuns(unit_of[name], int(held.sum()))

@@ -14,8 +14,6 @@ from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import Workers
 from mcstudy.report import Section
-from mcstudy.studyfile.identity import numbers_digest
-from mcstudy.studyfile.schema import Report
 from mcstudy.studyfile.study_outputs import check_outputs, report_outputs
 from models.protocol import Model, Run
 from studies.kind import Finished, StudyKind
@@ -23,9 +21,14 @@ from studies.model_comparison.analysis import analyse, published_methods
 from studies.model_comparison.numbers import ComparisonAnalysis
 from studies.model_comparison.report import draw, sections_of, summarise
 from studies.model_comparison.schema import ModelComparison
-from studies.monte_carlo.design import sample_inputs
-from studies.monte_carlo.schema import MonteCarloStudy
-from studies.paired_runs import PreparedCell, cell_folder, cell_runs, run_cells
+from studies.paired_runs import (
+    PreparedCell,
+    cell_folder,
+    cell_runs,
+    prepare_model,
+    run_cells,
+    study_of_model,
+)
 from studies.runs import load_study_model
 
 NOMINAL = "nominal.json"
@@ -64,7 +67,7 @@ class Comparison(
 
     def plan(self, study: ModelComparison, folder: ResultsFolder) -> list[PreparedCell]:
         """Return the cells, each with its model and the values of every input."""
-        cells = [_prepare(study, label, folder) for label in study.models]
+        cells = [prepare_model(study, label, study.design, folder) for label in study.models]
         compared_outputs(study, {cell.name: cell.model for cell in cells})
         published_methods(study, cells[0].model)
         return cells
@@ -100,7 +103,10 @@ class Comparison(
 
     def results(self, study: ModelComparison, folder: ResultsFolder) -> ComparisonResults:
         """Return models, runs and nominal runs."""
-        models = {label: load_study_model(cell_study(study, label)) for label in study.models}
+        models = {
+            label: load_study_model(study_of_model(study, label, study.design))
+            for label in study.models
+        }
         return ComparisonResults(
             models,
             {
@@ -138,17 +144,6 @@ class Comparison(
         return summarise(analysis)
 
 
-def cell_study(study: ModelComparison, label: str) -> MonteCarloStudy:
-    """Return the comparison's study of one model."""
-    return MonteCarloStudy(
-        format=study.format, kind="monte-carlo", name=study.name, title=study.title,
-        seed=study.seed, model=study.models[label], fixed=study.fixed, design=study.design,
-        inputs=study.inputs, dependence=study.dependence,
-        max_failure_rate=study.max_failure_rate, run_time=study.run_time,
-        report=Report(histories=0),
-    )  # fmt: skip
-
-
 def compared_outputs(study: ModelComparison, models: dict[str, Model]) -> list[str]:
     """Return the outputs that are compared: those of the report, which every model must have.
 
@@ -158,10 +153,7 @@ def compared_outputs(study: ModelComparison, models: dict[str, Model]) -> list[s
         If a model lacks one, or has it in another unit.
     """
     first = next(iter(models))
-    chosen = cell_study(study, first).model_copy(
-        update={"report": Report(outputs=study.report.outputs, histories=0)}
-    )
-    names = report_outputs(chosen, models[first])
+    names = report_outputs(study_of_model(study, first, study.design), models[first])
     units = {item.name: item.unit for item in models[first].outputs}
     for label, model in models.items():
         check_outputs(names, model, f"models.{label}")
@@ -172,24 +164,6 @@ def compared_outputs(study: ModelComparison, models: dict[str, Model]) -> list[s
                     f"{units[item.name]}"
                 )
     return names
-
-
-def _prepare(study: ModelComparison, label: str, folder: ResultsFolder) -> PreparedCell:
-    """Return a model's cell with the values of every input.
-
-    Raises
-    ------
-    UserError
-        Naming the model, if the study does not fit it or its folder.
-    """
-    inner = cell_study(study, label)
-    try:
-        model = load_study_model(inner)
-        columns = sample_inputs(inner, model)
-        cell_folder(folder, label).check_same_study(numbers_digest(inner, model))
-    except UserError as error:
-        raise UserError(f"models.{label}: {error}") from None
-    return PreparedCell(label, inner, model, columns)
 
 
 def _nominal(run: Run, times: list[float]) -> dict[str, Any]:

@@ -10,7 +10,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mcstudy.errors import StudyError
-from mcstudy.execution.results import check_failures, status_counts
 from mcstudy.injury.functions import risk_function
 from mcstudy.multifidelity.allocation import ACV, MFMC
 from mcstudy.multifidelity.estimators import (
@@ -23,9 +22,10 @@ from mcstudy.multifidelity.estimators import (
 )
 from mcstudy.statistics import Estimate
 from mcstudy.typed_json import Real
-from models.protocol import Model, complete_status
+from models.protocol import Model
 from studies.multi_fidelity.schema import FidelityStudy, Risk
-from studies.runs import RunEnds, describe_ends
+from studies.paired_runs import describe_models, known_values
+from studies.runs import RunEnds
 
 Array = NDArray[np.float64]
 
@@ -132,19 +132,7 @@ def analyse(
     StudyError
         If more runs of a model failed than the study allows, or an output has too few values.
     """
-    everything = pd.concat([part.assign(model=label) for label, part in runs.items()])
-    everything = everything.reset_index(drop=True)
-    complete = np.zeros(len(everything), dtype=bool)
-    words = frozenset[str]()
-    for label, model in models.items():
-        counts = status_counts(runs[label])
-        try:
-            check_failures(counts, set(counts) - complete_status(model), study.max_failure_rate)
-        except StudyError as error:
-            raise StudyError(f"models.{label}: {error}") from None
-        own = (everything["model"] == label).to_numpy()
-        complete |= own & everything["status"].isin(complete_status(model)).to_numpy()
-        words |= complete_status(model)
+    ended = describe_models(study, models, runs)
     unit_of = {item.name: item.unit for item in models[allotment.order[0]].outputs}
     found = {}
     for name in outputs:
@@ -152,14 +140,7 @@ def analyse(
         if np.isfinite(values[0]).sum() < 2 * allotment.replicates:
             raise StudyError(f"{name}: too few runs of {allotment.order[0]} have a value")
         found[name] = _of_output(study, name, unit_of[name], values, allotment)
-    ended = describe_ends(study, everything, complete, words)
     return FidelityAnalysis(**vars(ended), allotment=allotment, outputs=found)
-
-
-def known_values(runs: pd.DataFrame, model: Model, output: str) -> Array:
-    """Return an output (n,) of a model's runs, NaN where a run failed."""
-    complete = runs["status"].isin(complete_status(model))
-    return runs[output].where(complete).to_numpy(dtype=float)
 
 
 def _of_output(

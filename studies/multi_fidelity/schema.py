@@ -6,16 +6,13 @@ from pydantic import Field, FiniteFloat, model_validator
 
 from mcstudy import units
 from mcstudy.injury.functions import risk_function
-from mcstudy.studyfile.distributions import Distribution, Unit
+from mcstudy.studyfile.distributions import Unit
 from mcstudy.studyfile.schema import (
     LARGEST_DESIGN,
-    AnyStudy,
-    Dependence,
-    Limits,
     ModelChoice,
+    ModelsStudy,
     OutputReport,
     StudyTable,
-    check_folder_name,
 )
 
 
@@ -81,20 +78,16 @@ class FidelityReport(OutputReport):
     risks: list[Risk] = []
 
 
-class FidelityStudy(AnyStudy, Limits):
+class FidelityStudy(ModelsStudy):
     """``kind = "multi-fidelity"``: the distribution of the dearest of several models."""
 
     kind: Literal["multi-fidelity"]
     models: Annotated[dict[str, FidelityModel], Field(min_length=2, max_length=6)]
     budget: Budget
-    inputs: Annotated[dict[str, Distribution], Field(min_length=1)]
-    dependence: Dependence = Dependence()
     report: FidelityReport = FidelityReport()
 
     @model_validator(mode="after")
-    def _plain_labels(self) -> "FidelityStudy":
-        for label in self.models:
-            check_folder_name(label, "models: ")
+    def _known_reference(self) -> "FidelityStudy":
         named = self.budget.reference
         if named is not None and named not in self.models:
             raise ValueError(f"budget.reference: {named!r} is none of {', '.join(self.models)}")

@@ -7,11 +7,11 @@ Every model has a cell of its own; run k of every cell has the same inputs and b
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.progress import say
@@ -19,18 +19,23 @@ from mcstudy.execution.results import ResultsFolder, digest
 from mcstudy.execution.workers import Workers
 from mcstudy.multifidelity.allocation import allocate
 from mcstudy.report import Section, Table
-from mcstudy.studyfile.identity import numbers_digest
-from mcstudy.studyfile.schema import Design, ModelChoice, Report
+from mcstudy.studyfile.schema import Design
 from mcstudy.studyfile.study_outputs import check_outputs, report_outputs
 from models.protocol import Model
 from studies.kind import Finished, StudyKind
-from studies.monte_carlo.design import sample_inputs
-from studies.monte_carlo.schema import MonteCarloStudy
-from studies.multi_fidelity.analysis import Allotment, FidelityAnalysis, analyse, known_values
+from studies.multi_fidelity.analysis import Allotment, FidelityAnalysis, analyse
 from studies.multi_fidelity.report import draw, sections_of, summarise
 from studies.multi_fidelity.schema import FidelityStudy
-from studies.paired_runs import PreparedCell, cell_folder, cell_runs
-from studies.runs import columns_of, load_study_model, run_rows
+from studies.paired_runs import (
+    PreparedCell,
+    cell_runs,
+    known_values,
+    prepare_model,
+    run_model,
+    study_of_model,
+    take_over,
+)
+from studies.runs import load_study_model
 
 ALLOTMENT = "allotment.json"
 """File of the measured costs and of the runs of each model."""
@@ -60,7 +65,8 @@ class MultiFidelity(
 
     def plan(self, study: FidelityStudy, folder: ResultsFolder) -> list[PreparedCell]:
         """Return the cells with the inputs of the pilot runs."""
-        cells = [_prepare(study, label, study.budget.pilot, folder) for label in study.models]
+        design = cell_design(study.budget.pilot)
+        cells = [prepare_model(study, label, design, folder) for label in study.models]
         for cell in cells:
             check_outputs(reported(study, cell.model), cell.model, f"models.{cell.name}")
         return cells
@@ -99,9 +105,11 @@ class MultiFidelity(
         }
         folder.write_json("manifest.json", manifest)
         for cell in plan:
-            _take_over(study, cell, folder)
+            take_over(cell, study.models[cell.name].reuse, folder)
         pilots = {
-            cell.name: _run(study, cell, study.budget.pilot, folder, workers, quiet)
+            cell.name: run_model(
+                cell, folder, _replicates(study, cell), workers=workers, quiet=quiet
+            )
             for cell in plan
         }
         allotment = _allot(study, plan, pilots, folder)
@@ -111,9 +119,9 @@ class MultiFidelity(
         digests, counts = {}, pd.Series(dtype=int)
         for cell in plan:
             n = allotment.runs[cell.name]
-            whole = _prepare(study, cell.name, n, folder)
+            whole = prepare_model(study, cell.name, cell_design(n), folder)
             say(f"{cell.name}: {n:,} runs of {allotment.costs[cell.name]:.3g} s", quiet=quiet)
-            runs = _run(study, whole, n, folder, workers, quiet)
+            runs = run_model(whole, folder, _replicates(study, whole), workers=workers, quiet=quiet)
             digests[cell.name] = digest(runs)
             counts = counts.add(runs["status"].value_counts(), fill_value=0)
         manifest |= {
@@ -129,7 +137,7 @@ class MultiFidelity(
             raise UserError(f"{folder.path}: the pilot runs are not done; run the study again")
         allotment = Allotment(**folder.read_json(ALLOTMENT))
         models = {
-            label: load_study_model(cell_study(study, label, study.budget.pilot))
+            label: load_study_model(study_of_model(study, label, cell_design(1)))
             for label in study.models
         }
         runs = {
@@ -171,84 +179,20 @@ def _design(n: int, cells: Sequence[PreparedCell]) -> dict[str, Any]:
     return {"method": "monte-carlo", "n": n, "cells": [cell.name for cell in cells]}
 
 
-def cell_study(study: FidelityStudy, label: str, n: int) -> MonteCarloStudy:
-    """Return the Monte Carlo study of one model and n runs."""
-    chosen = study.models[label]
-    return MonteCarloStudy(
-        format=study.format, kind="monte-carlo", name=study.name, title=study.title,
-        seed=study.seed, model=ModelChoice(name=chosen.name, options=chosen.options),
-        fixed=study.fixed, design=Design(method="monte-carlo", n=n), inputs=study.inputs,
-        dependence=study.dependence, max_failure_rate=study.max_failure_rate,
-        run_time=study.run_time, report=Report(outputs=study.report.outputs, histories=0),
-    )  # fmt: skip
+def _replicates(study: FidelityStudy, cell: PreparedCell) -> NDArray[np.int64]:
+    """Return the replicate of each run of a cell."""
+    return np.arange(cell.study.design.n) % study.budget.replicates
+
+
+def cell_design(n: int) -> Design:
+    """Return the design of a model's n runs: those of fewer runs come first."""
+    return Design(method="monte-carlo", n=n)
 
 
 def reported(study: FidelityStudy, model: Model) -> list[str]:
     """Return the outputs of the report: those named, that of the budget, those with limits."""
-    base = report_outputs(cell_study(study, next(iter(study.models)), study.budget.pilot), model)
+    base = report_outputs(study_of_model(study, next(iter(study.models)), cell_design(1)), model)
     return list(dict.fromkeys([*base, study.budget.output, *study.report.limits]))
-
-
-def _prepare(study: FidelityStudy, label: str, n: int, folder: ResultsFolder) -> PreparedCell:
-    """Return a model's cell with the values of every input of its first n runs.
-
-    Raises
-    ------
-    UserError
-        Naming the model, if the study does not fit it or its folder.
-    """
-    inner = cell_study(study, label, n)
-    try:
-        model = load_study_model(inner)
-        columns = sample_inputs(inner, model)
-        cell_folder(folder, label).check_same_study(numbers_digest(inner, model))
-    except UserError as error:
-        raise UserError(f"models.{label}: {error}") from None
-    return PreparedCell(label, inner, model, columns)
-
-
-def _take_over(study: FidelityStudy, cell: PreparedCell, folder: ResultsFolder) -> None:
-    """Copy the runs of a finished study of the same design into a cell that has none.
-
-    Raises
-    ------
-    UserError
-        If the study has other inputs, another seed or another model.
-    """
-    source = study.models[cell.name].reuse
-    inner = cell_folder(folder, cell.name)
-    if source is None or inner.done() is not None:
-        return
-    finished = ResultsFolder(Path(source))
-    if not (finished.path / "manifest.json").exists():
-        raise UserError(f"models.{cell.name}.reuse: {source}: is no results folder")
-    try:
-        finished.check_same_study(numbers_digest(cell.study, cell.model))
-    except UserError as error:
-        raise UserError(f"models.{cell.name}.reuse: {error}") from None
-    with inner.open_for_writing():
-        inner.add_part(finished.runs(columns_of(cell.model)))
-
-
-def _run(
-    study: FidelityStudy,
-    cell: PreparedCell,
-    n: int,
-    folder: ResultsFolder,
-    workers: Workers,
-    quiet: bool,
-) -> pd.DataFrame:
-    """Return the first n runs of a cell, after running those that are missing."""
-    inner = cell_folder(folder, cell.name)
-    try:
-        with inner.open_for_writing():
-            return run_rows(
-                cell.study, cell.model, cell.columns, inner,
-                design={"method": "monte-carlo", "n": n, "replicate_size": 1},
-                replicate=np.arange(n) % study.budget.replicates, workers=workers, quiet=quiet,
-            )  # fmt: skip
-    except StudyError as error:
-        raise StudyError(f"models.{cell.name}: {error}") from None
 
 
 def _allot(

@@ -13,6 +13,7 @@ from mcstudy.studyfile.schema import AnyStudy
 from studies.injury.study import Injury
 from studies.kind import StudyKind
 from studies.method_comparison.schema import MethodComparison
+from studies.model_chain.study import Chain
 from studies.model_comparison.study import Comparison
 from studies.monte_carlo.study import MonteCarlo
 from studies.morris.study import Morris
@@ -31,6 +32,7 @@ KINDS: dict[str, StudyKind[Any, Any, Any, Any]] = {
         Comparison(),
         ResponseMap(),
         MultiFidelity(),
+        Chain(),
     )
 }
 """A new kind of study is its folder and one line here."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -11,14 +10,12 @@ from numpy.typing import NDArray
 
 from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.progress import say
-from mcstudy.execution.results import ResultsFolder, check_failures, digest, status_counts
+from mcstudy.execution.results import ResultsFolder, digest
 from mcstudy.execution.workers import Workers
-from mcstudy.studyfile.identity import numbers_digest
-from mcstudy.studyfile.schema import Design, ModelChoice, ModelsStudy, Report
-from models.protocol import Model, complete_status
-from studies.monte_carlo.design import sample_inputs
+from mcstudy.studyfile.schema import Design
+from models.protocol import Model
 from studies.monte_carlo.schema import MonteCarloStudy
-from studies.runs import RunEnds, columns_of, describe_ends, load_study_model, run_rows
+from studies.runs import columns_of, run_rows
 
 Array = NDArray[np.float64]
 
@@ -26,8 +23,8 @@ BATCHES = 20
 """Batches of an independent sample for intervals between batches (assumed)."""
 
 
-class PairedStudy(Protocol):
-    """A study whose cells share their draws."""
+class CellStudy(Protocol):
+    """A study of several cells."""
 
     @property
     def name(self) -> str:
@@ -40,6 +37,10 @@ class PairedStudy(Protocol):
     @property
     def seed(self) -> int:
         """Seed of the draws."""
+
+
+class PairedStudy(CellStudy, Protocol):
+    """A study whose cells share their draws."""
 
     @property
     def design(self) -> Design:
@@ -90,37 +91,73 @@ def run_cells(
         If too many runs of a cell failed, or the workers are lost.
     """
     n, size = study.design.n, study.design.size
-    manifest: dict[str, Any] = {
-        "format": "mcstudy-results/1",
-        "study": study.name,
-        "kind": study.kind,
-        "seed": study.seed,
-        "design": {
-            "method": study.design.method,
-            "n": n * len(cells),
-            "cells": [cell.name for cell in cells],
-        },
-        "finished": False,
-    }
-    folder.write_json("manifest.json", manifest)
-    digests, counts = {}, pd.Series(dtype=int)
+    manifest = start_manifest(study, folder, study.design.method, n * len(cells), cells)
+    tables = {}
     for cell in cells:
         say(f"{cell.name.replace('/', ', ')}:", quiet=quiet)
         inner = cell_folder(folder, cell.name)
         try:
             with inner.open_for_writing():
-                runs = run_rows(
+                tables[cell.name] = run_rows(
                     cell.study, cell.model, cell.columns, inner,
                     design={"method": study.design.method, "n": n, "replicate_size": size},
                     replicate=np.arange(n) // size, workers=workers, quiet=quiet,
                 )  # fmt: skip
         except StudyError as error:
             raise StudyError(f"{cell.name}: {error}") from None
-        digests[cell.name] = digest(runs)
+    finish_manifest(manifest, folder, tables)
+
+
+def start_manifest(
+    study: CellStudy, folder: ResultsFolder, method: str, n: int, cells: Sequence[PreparedCell]
+) -> dict[str, Any]:
+    """Write the manifest of a study of several cells that is not finished, and return it.
+
+    Parameters
+    ----------
+    study : CellStudy
+        Checked study file.
+    folder : ResultsFolder
+        Open for writing.
+    method : str
+        Method of the design.
+    n : int
+        Runs of all cells.
+    cells : sequence of PreparedCell
+        In the order in which they are run.
+    """
+    manifest: dict[str, Any] = {
+        "format": "mcstudy-results/1",
+        "study": study.name,
+        "kind": study.kind,
+        "seed": study.seed,
+        "design": {"method": method, "n": n, "cells": [cell.name for cell in cells]},
+        "finished": False,
+    }
+    folder.write_json("manifest.json", manifest)
+    return manifest
+
+
+def finish_manifest(
+    manifest: dict[str, Any], folder: ResultsFolder, tables: Mapping[str, pd.DataFrame]
+) -> None:
+    """Write the manifest of a study of several cells whose runs are done.
+
+    Parameters
+    ----------
+    manifest : dict
+        From ``start_manifest``.
+    folder : ResultsFolder
+        Open for writing.
+    tables : mapping
+        Table of runs by cell.
+    """
+    counts = pd.Series(dtype=int)
+    for runs in tables.values():
         counts = counts.add(runs["status"].value_counts(), fill_value=0)
-    manifest |= {
+    manifest = manifest | {
         "counts": {str(k): int(v) for k, v in counts.items()},
-        "digests": digests,
+        "digests": {name: digest(runs) for name, runs in tables.items()},
         "finished": True,
     }
     folder.write_json("manifest.json", manifest)
@@ -153,178 +190,6 @@ def cell_runs(folder: ResultsFolder, name: str, n: int, model: Model) -> pd.Data
             f"{inner.path}: {len(runs)} of {n} runs are done; run the study again to resume"
         )
     return runs
-
-
-def study_of_model(study: ModelsStudy, label: str, design: Design) -> MonteCarloStudy:
-    """Return the Monte Carlo study of one of several models.
-
-    Parameters
-    ----------
-    study : ModelsStudy
-        Checked study file.
-    label : str
-        Of the model.
-    design : Design
-        Design of its runs.
-    """
-    chosen = study.models[label]
-    return MonteCarloStudy(
-        format=study.format, kind="monte-carlo", name=study.name, title=study.title,
-        seed=study.seed, model=ModelChoice(name=chosen.name, options=chosen.options),
-        fixed=study.fixed, design=design, inputs=study.inputs, dependence=study.dependence,
-        max_failure_rate=study.max_failure_rate, run_time=study.run_time,
-        report=Report(outputs=study.report.outputs, histories=0),
-    )  # fmt: skip
-
-
-def prepare_model(
-    study: ModelsStudy, label: str, design: Design, folder: ResultsFolder
-) -> PreparedCell:
-    """Return a model's cell with the values of every input.
-
-    Parameters
-    ----------
-    study : ModelsStudy
-        Checked study file.
-    label : str
-        Of the model.
-    design : Design
-        Design of its runs.
-    folder : ResultsFolder
-        Of the study.
-
-    Raises
-    ------
-    UserError
-        Naming the model, if the study does not fit it or its folder.
-    """
-    inner = study_of_model(study, label, design)
-    try:
-        model = load_study_model(inner)
-        columns = sample_inputs(inner, model)
-        cell_folder(folder, label).check_same_study(numbers_digest(inner, model))
-    except UserError as error:
-        raise UserError(f"models.{label}: {error}") from None
-    return PreparedCell(label, inner, model, columns)
-
-
-def take_over(cell: PreparedCell, source: str | None, folder: ResultsFolder) -> None:
-    """Copy the runs of a finished study of the same design into a cell that has none.
-
-    Parameters
-    ----------
-    cell : PreparedCell
-        Of a model.
-    source : str or None
-        Results folder of the study, or the cell of one; None to copy nothing.
-    folder : ResultsFolder
-        Of the study, open for writing.
-
-    Raises
-    ------
-    UserError
-        If the source has other inputs, another seed or another model.
-    """
-    inner = cell_folder(folder, cell.name)
-    if source is None or inner.done() is not None:
-        return
-    finished = ResultsFolder(Path(source))
-    if not (finished.path / "manifest.json").exists():
-        raise UserError(f"models.{cell.name}.reuse: {source}: is no results folder")
-    try:
-        finished.check_same_study(numbers_digest(cell.study, cell.model))
-    except UserError as error:
-        raise UserError(f"models.{cell.name}.reuse: {error}") from None
-    with inner.open_for_writing():
-        inner.add_part(finished.runs(columns_of(cell.model)))
-
-
-def run_model(
-    cell: PreparedCell,
-    folder: ResultsFolder,
-    replicate: NDArray[np.int64],
-    *,
-    workers: Workers,
-    quiet: bool,
-) -> pd.DataFrame:
-    """Return the runs of a model's cell, after running those that are missing.
-
-    Parameters
-    ----------
-    cell : PreparedCell
-        Of a model.
-    folder : ResultsFolder
-        Of the study, open for writing.
-    replicate : (n,) int array
-        Replicate of each run.
-    workers : int or str
-        Processes, -1 for one per core, or the address of a dask scheduler.
-    quiet : bool
-        No progress line.
-
-    Raises
-    ------
-    StudyError
-        If too many runs failed, or the workers are lost.
-    """
-    inner, design = cell_folder(folder, cell.name), cell.study.design
-    try:
-        with inner.open_for_writing():
-            return run_rows(
-                cell.study, cell.model, cell.columns, inner,
-                design={"method": design.method, "n": design.n, "replicate_size": design.size},
-                replicate=replicate, workers=workers, quiet=quiet,
-            )  # fmt: skip
-    except StudyError as error:
-        raise StudyError(f"models.{cell.name}: {error}") from None
-
-
-def describe_models(
-    study: ModelsStudy, models: Mapping[str, Model], runs: Mapping[str, pd.DataFrame]
-) -> RunEnds:
-    """Return how the runs of several models ended.
-
-    Parameters
-    ----------
-    study : ModelsStudy
-        Checked study file.
-    models, runs : mapping
-        Models and tables of runs by label.
-
-    Raises
-    ------
-    StudyError
-        If more runs of a model failed than the study allows.
-    """
-    everything = pd.concat([part.assign(model=label) for label, part in runs.items()])
-    everything = everything.reset_index(drop=True)
-    complete = np.zeros(len(everything), dtype=bool)
-    words = frozenset[str]()
-    for label, model in models.items():
-        counts = status_counts(runs[label])
-        try:
-            check_failures(counts, set(counts) - complete_status(model), study.max_failure_rate)
-        except StudyError as error:
-            raise StudyError(f"models.{label}: {error}") from None
-        own = (everything["model"] == label).to_numpy()
-        complete |= own & everything["status"].isin(complete_status(model)).to_numpy()
-        words |= complete_status(model)
-    return describe_ends(study, everything, complete, words)
-
-
-def known_values(runs: pd.DataFrame, model: Model, output: str) -> Array:
-    """Return an output (n,) of a model's runs, NaN where a run failed.
-
-    Parameters
-    ----------
-    runs : DataFrame
-        Table of its runs.
-    model : Model
-    output : str
-        Name of the output.
-    """
-    complete = runs["status"].isin(complete_status(model))
-    return runs[output].where(complete).to_numpy(dtype=float)
 
 
 def batch_of(study: PairedStudy, runs: pd.DataFrame) -> NDArray[np.int64]:

@@ -22,6 +22,7 @@ from mcstudy.sensitivity.given_data import MIN_RUNS, measure_given_data
 from mcstudy.statistics import Estimate, scale_of, varies
 from mcstudy.studyfile.study_outputs import check_outputs
 from models.protocol import Model
+from studies.model_cells import describe_models, known_values
 from studies.model_comparison.numbers import (
     ApartRun,
     ComparedModel,
@@ -33,7 +34,7 @@ from studies.model_comparison.numbers import (
     TooFewRuns,
 )
 from studies.model_comparison.schema import ModelComparison
-from studies.paired_runs import batch_of, describe_models, known_values
+from studies.paired_runs import batch_of
 
 Array = NDArray[np.float64]
 

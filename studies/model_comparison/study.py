@@ -10,25 +10,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import Workers
 from mcstudy.report import Section
-from mcstudy.studyfile.study_outputs import check_outputs, report_outputs
 from models.protocol import Model, Run
 from studies.kind import Finished, StudyKind
+from studies.model_cells import prepare_model, shared_outputs, study_of_model
 from studies.model_comparison.analysis import analyse, published_methods
 from studies.model_comparison.numbers import ComparisonAnalysis
 from studies.model_comparison.report import draw, sections_of, summarise
 from studies.model_comparison.schema import ModelComparison
-from studies.paired_runs import (
-    PreparedCell,
-    cell_folder,
-    cell_runs,
-    prepare_model,
-    run_cells,
-    study_of_model,
-)
+from studies.paired_runs import PreparedCell, cell_folder, cell_runs, run_cells
 from studies.runs import load_study_model
 
 NOMINAL = "nominal.json"
@@ -68,7 +60,7 @@ class Comparison(
     def plan(self, study: ModelComparison, folder: ResultsFolder) -> list[PreparedCell]:
         """Return the cells, each with its model and the values of every input."""
         cells = [prepare_model(study, label, study.design, folder) for label in study.models]
-        compared_outputs(study, {cell.name: cell.model for cell in cells})
+        shared_outputs(study, {cell.name: cell.model for cell in cells})
         published_methods(study, cells[0].model)
         return cells
 
@@ -118,7 +110,7 @@ class Comparison(
 
     def analyse(self, study: ModelComparison, results: ComparisonResults) -> ComparisonAnalysis:
         """Return every number that the report prints."""
-        outputs = compared_outputs(study, results.models)
+        outputs = shared_outputs(study, results.models)
         return analyse(study, results.models, results.runs, results.nominal, outputs)
 
     def subtitle(self, done: Done) -> str:
@@ -142,28 +134,6 @@ class Comparison(
     def summarise(self, analysis: ComparisonAnalysis) -> list[str]:
         """Return the agreement of the models."""
         return summarise(analysis)
-
-
-def compared_outputs(study: ModelComparison, models: dict[str, Model]) -> list[str]:
-    """Return the outputs that are compared: those of the report, which every model must have.
-
-    Raises
-    ------
-    UserError
-        If a model lacks one, or has it in another unit.
-    """
-    first = next(iter(models))
-    names = report_outputs(study_of_model(study, first, study.design), models[first])
-    units = {item.name: item.unit for item in models[first].outputs}
-    for label, model in models.items():
-        check_outputs(names, model, f"models.{label}")
-        for item in model.outputs:
-            if item.name in names and item.unit != units[item.name]:
-                raise UserError(
-                    f"models.{label}: gives {item.name} in {item.unit}, models.{first} in "
-                    f"{units[item.name]}"
-                )
-    return names
 
 
 def _nominal(run: Run, times: list[float]) -> dict[str, Any]:

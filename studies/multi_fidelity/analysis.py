@@ -23,8 +23,8 @@ from mcstudy.multifidelity.estimators import (
 from mcstudy.statistics import Estimate
 from mcstudy.typed_json import Real
 from models.protocol import Model
+from studies.model_cells import describe_models, known_values
 from studies.multi_fidelity.schema import FidelityStudy, Risk
-from studies.paired_runs import describe_models, known_values
 from studies.runs import RunEnds
 
 Array = NDArray[np.float64]

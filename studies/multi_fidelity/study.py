@@ -7,7 +7,7 @@ Every model has a cell of its own; run k of every cell has the same inputs and b
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mcstudy.errors import StudyError, UserError
 from mcstudy.execution.progress import say
-from mcstudy.execution.results import ResultsFolder, digest
+from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import Workers
 from mcstudy.multifidelity.allocation import allocate
 from mcstudy.report import Section, Table
@@ -23,22 +23,23 @@ from mcstudy.studyfile.schema import Design
 from mcstudy.studyfile.study_outputs import check_outputs, report_outputs
 from models.protocol import Model
 from studies.kind import Finished, StudyKind
-from studies.multi_fidelity.analysis import Allotment, FidelityAnalysis, analyse
-from studies.multi_fidelity.report import draw, sections_of, summarise
-from studies.multi_fidelity.schema import FidelityStudy
-from studies.paired_runs import (
-    PreparedCell,
-    cell_runs,
+from studies.model_cells import (
     known_values,
     prepare_model,
     run_model,
     study_of_model,
     take_over,
 )
+from studies.multi_fidelity.analysis import Allotment, FidelityAnalysis, analyse
+from studies.multi_fidelity.report import draw, sections_of, summarise
+from studies.multi_fidelity.schema import FidelityStudy
+from studies.paired_runs import PreparedCell, cell_runs, finish_manifest, start_manifest
 from studies.runs import load_study_model
 
 ALLOTMENT = "allotment.json"
 """File of the measured costs and of the runs of each model."""
+METHOD: Literal["monte-carlo"] = "monte-carlo"
+"""Design of the runs: those of fewer runs come first."""
 TIMED = 1.0
 """s of runs by which the cost of a run is measured, at least one run."""
 
@@ -95,41 +96,29 @@ class MultiFidelity(
         quiet : bool
             No progress line.
         """
-        manifest: dict[str, Any] = {
-            "format": "mcstudy-results/1",
-            "study": study.name,
-            "kind": study.kind,
-            "seed": study.seed,
-            "design": _design(len(plan) * study.budget.pilot, plan),
-            "finished": False,
-        }
-        folder.write_json("manifest.json", manifest)
+        pilots = len(plan) * study.budget.pilot
+        start_manifest(study, folder, METHOD, pilots, plan)
         for cell in plan:
             take_over(cell, study.models[cell.name].reuse, folder)
-        pilots = {
+        piloted = {
             cell.name: run_model(
                 cell, folder, _replicates(study, cell), workers=workers, quiet=quiet
             )
             for cell in plan
         }
-        allotment = _allot(study, plan, pilots, folder)
+        allotment = _allot(study, plan, piloted, folder)
         folder.write_json(ALLOTMENT, allotment)
-        manifest["design"] = _design(sum(allotment.runs.values()), plan)
-        folder.write_json("manifest.json", manifest)
-        digests, counts = {}, pd.Series(dtype=int)
+        n_all = sum(allotment.runs.values())
+        manifest = start_manifest(study, folder, METHOD, n_all, plan)
+        tables = {}
         for cell in plan:
             n = allotment.runs[cell.name]
             whole = prepare_model(study, cell.name, cell_design(n), folder)
             say(f"{cell.name}: {n:,} runs of {allotment.costs[cell.name]:.3g} s", quiet=quiet)
-            runs = run_model(whole, folder, _replicates(study, whole), workers=workers, quiet=quiet)
-            digests[cell.name] = digest(runs)
-            counts = counts.add(runs["status"].value_counts(), fill_value=0)
-        manifest |= {
-            "counts": {str(k): int(v) for k, v in counts.items()},
-            "digests": digests,
-            "finished": True,
-        }
-        folder.write_json("manifest.json", manifest)
+            tables[cell.name] = run_model(
+                whole, folder, _replicates(study, whole), workers=workers, quiet=quiet
+            )
+        finish_manifest(manifest, folder, tables)
 
     def results(self, study: FidelityStudy, folder: ResultsFolder) -> FidelityResults:
         """Return models, runs and allotment."""
@@ -174,11 +163,6 @@ class MultiFidelity(
         return summarise(analysis)
 
 
-def _design(n: int, cells: Sequence[PreparedCell]) -> dict[str, Any]:
-    """Return the design of the manifest: the runs of all cells."""
-    return {"method": "monte-carlo", "n": n, "cells": [cell.name for cell in cells]}
-
-
 def _replicates(study: FidelityStudy, cell: PreparedCell) -> NDArray[np.int64]:
     """Return the replicate of each run of a cell."""
     return np.arange(cell.study.design.n) % study.budget.replicates
@@ -186,7 +170,7 @@ def _replicates(study: FidelityStudy, cell: PreparedCell) -> NDArray[np.int64]:
 
 def cell_design(n: int) -> Design:
     """Return the design of a model's n runs: those of fewer runs come first."""
-    return Design(method="monte-carlo", n=n)
+    return Design(method=METHOD, n=n)
 
 
 def reported(study: FidelityStudy, model: Model) -> list[str]:

@@ -92,6 +92,7 @@ DESIGNS = {
     "model-comparison": "n = 60\nreplicate_size = 10",
     "map": "n = 12\nreplicate_size = 4",
     "multi-fidelity": "cpu_time = 60.0",
+    "model-chain": "n = 60\nreplicate_size = 10",
 }
 GRID = """
 [axes.impact_angle]
@@ -136,7 +137,7 @@ def study_text(
     hoods = {"model": force}
     if kind == "model-comparison":
         hoods = {"models.soft": force, "models.stiff": 2.0 * force}
-    if kind == "multi-fidelity":
+    if kind in ("multi-fidelity", "model-chain"):
         hoods = {"models.soft": force, "models.stiff": 2.0 * force}
     text += "".join(HOOD.format(table=name, force=value) for name, value in hoods.items())
     if kind == "multi-fidelity":
@@ -145,6 +146,8 @@ def study_text(
         text = text[:cheap].replace("\n[models.soft]", "\n[models.soft]\ncost = 1.0")
         text += "channel_class = 1000.0 }\ncost = 0.05\n"
         text += f'\n[budget]\n{design or DESIGNS[kind]}\noutput = "hic15"\n{inputs}{more}'
+    elif kind == "model-chain":
+        text += f'changes = ["hood"]\n\n[design]\n{design or DESIGNS[kind]}\n{inputs}{more}'
     else:
         text += f"\n[design]\n{design or DESIGNS[kind]}\n{inputs}{more}"
     if kind == "injury":
@@ -154,6 +157,7 @@ def study_text(
     extra = {
         "monte-carlo": "histories = 0",
         "model-comparison": "",
+        "model-chain": "",
         "map": "limits.hic15 = [250.0, 400.0]",
         "multi-fidelity": "limits.hic15 = [250.0]\n"
         'risks = [{ function = "nhtsa_lognormal", level = 3, age = 8.0 }]',

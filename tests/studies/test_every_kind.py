@@ -45,6 +45,7 @@ LARGER = {
     "model-comparison": "n = 80\nreplicate_size = 10",
     "map": "n = 20\nreplicate_size = 4",
     "multi-fidelity": "cpu_time = 120.0",
+    "model-chain": "n = 80\nreplicate_size = 10",
 }
 FIGURES = {
     "monte-carlo": {"distributions", "rank_correlation", "convergence", "impact_speed"},
@@ -54,6 +55,7 @@ FIGURES = {
     "model-comparison": {"variance", "pairs_soft_stiff", "breaking_soft_stiff", "along_soft_stiff"},
     "map": {"map_hic15", "exceedance_hic15"},
     "multi-fidelity": {"exceedance_hic15"},
+    "model-chain": {"split_hic15"},
 }
 SOFT = FAILING.replace("median = 8.4", "median = 2.0")
 """Hoods of which one in ten is too soft."""
@@ -187,7 +189,7 @@ def test_a_killed_study_goes_on_to_the_same_bits(
     kind: str, finished: ResultsFolder, folder: ResultsFolder, fast: None
 ) -> None:
     cut(folder, lambda runs: (runs["run"] % 7 != 3) & ~runs["run"].between(10, 25))
-    if kind in ("injury", "model-comparison", "multi-fidelity"):
+    if kind in ("injury", "model-comparison", "multi-fidelity", "model-chain"):
         shutil.rmtree(parts_of(folder)[0].path)
     held = [part.runs()["run"] for part in parts_of(folder) if part.path.exists()]
     with recorded_parts() as ids:
@@ -276,7 +278,7 @@ def test_another_study_is_refused_with_what_differs_and_changes_nothing(
     assert text != text_of(kind)
     said = told(mcstudy("run", study_file(tmp_path / "s.toml", text), "--out", finished.path))
     assert f"holds another study (it differs in {differs})" in said
-    if kind in ("injury", "model-comparison"):
+    if kind in ("injury", "model-comparison", "model-chain"):
         assert said.startswith(("mcstudy: scenario reference, front car: ", "mcstudy: models.soft"))
     assert contents(finished.path) == before
 
@@ -368,7 +370,7 @@ def test_an_unfinished_folder_tells_to_go_on_or_reports_its_whole_parts(
     status = json.loads(mcstudy("status", folder.path, "--json").out)
     assert status == {"done": total - lost, "total": total, "counts": {"ok": total - lost}}
     answer = mcstudy("report", folder.path, "--json")
-    if kind in ("injury", "model-comparison", "multi-fidelity"):
+    if kind in ("injury", "model-comparison", "multi-fidelity", "model-chain"):
         assert "run the study again" in told(answer)
         return
     wanted = {"monte-carlo": 119, "sobol": 50 // 6 * 6, "morris": 50 // 5 * 5, "map": 66}[kind]

@@ -13,6 +13,7 @@ MORRIS = 4
 OUTCOME = 5
 AGREEMENT = 6
 PERTURBATION = 7
+EVIDENCE = 8
 
 
 def generator(seed: int, stream: int, index: int = 0) -> np.random.Generator:

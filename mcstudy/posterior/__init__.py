@@ -1,0 +1,1 @@
+"""Posterior of inputs given evidence, from a bank of runs: weights, draws, calibration, ratios."""

@@ -199,7 +199,7 @@ class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
         """Return the sections of the report, from what ``draw`` returns."""
 
     @abstractmethod
-    def summarise(self, analysis: Analysis) -> list[str] | list[Table]:
+    def summarise(self, analysis: Analysis) -> Sequence[str | Table]:
         """Return the command line's summary of an analysis, paragraphs or tables."""
 
     def independent_rows(self, runs: Any, folder: ResultsFolder) -> Any:

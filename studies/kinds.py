@@ -18,6 +18,7 @@ from studies.model_comparison.study import Comparison
 from studies.monte_carlo.study import MonteCarlo
 from studies.morris.study import Morris
 from studies.multi_fidelity.study import MultiFidelity
+from studies.posterior.study import PosteriorOf
 from studies.reconstruction.schema import Reconstruction
 from studies.response_map.study import ResponseMap
 from studies.sobol.study import Sobol
@@ -33,6 +34,7 @@ KINDS: dict[str, StudyKind[Any, Any, Any, Any]] = {
         ResponseMap(),
         MultiFidelity(),
         Chain(),
+        PosteriorOf(),
     )
 }
 """A new kind of study is its folder and one line here."""

@@ -90,11 +90,14 @@ class Posterior:
         Prior weight of each run, in place of equal ones.
     seed : int
         Of the noise of the simulated evidence.
+    sets : int
+        Simulated sets of evidence that are aimed at.
 
     Raises
     ------
     ValueError
-        If no item has a value, or no run agrees with bounds and events.
+        If no item has a value, no run agrees with bounds and events, or some that do have no
+        target.
     """
 
     def __init__(
@@ -105,13 +108,19 @@ class Posterior:
         *,
         weights: Array | None = None,
         seed: int = 0,
+        sets: int = SETS,
     ) -> None:
         self.bank, self.target = bank, target
-        copies = int(np.clip(SETS // bank.size, 1, MOST_COPIES))
+        copies = int(np.clip(sets // bank.size, 1, MOST_COPIES))
         self.simulated: Simulated = simulate_evidence(bank, items, seed=seed, copies=copies)
         rows = self.simulated.rows
         self.prior = np.ones(bank.size) if weights is None else weights
         values = bank.values[target][rows]
+        if not np.isfinite(values).all():
+            raise ValueError(
+                f"{target}: some runs that agree with the evidence have none; say with 'happened' "
+                "that there is one"
+            )
         self.scale = Scale.of(values)
         unbounded = self.scale.forth(values)
         own = self.prior[rows]

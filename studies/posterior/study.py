@@ -1,0 +1,106 @@
+"""The posterior study: a bank of runs over the priors, and what the evidence says.
+
+The bank does not depend on the evidence: other evidence, narrower priors and other propositions
+cost no run (``mcstudy infer``).
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mcstudy.execution.results import ResultsFolder
+from mcstudy.execution.workers import Workers
+from mcstudy.report import Section, Table
+from mcstudy.sampling import designs
+from mcstudy.studyfile.identity import numbers_digest
+from mcstudy.studyfile.study_inputs import map_inputs
+from mcstudy.studyfile.study_outputs import report_outputs
+from studies.kind import Finished, StudyKind
+from studies.posterior.analysis import analyse
+from studies.posterior.evidence import check_tables
+from studies.posterior.numbers import PosteriorAnalysis
+from studies.posterior.report import draw, sections_of, summarise
+from studies.posterior.schema import PosteriorStudy
+from studies.runs import ModelRuns, RunPlan, columns_of, load_study_model, run_rows
+
+Done = Finished[PosteriorStudy, ModelRuns, PosteriorAnalysis]
+
+
+class PosteriorOf(StudyKind[PosteriorStudy, RunPlan, ModelRuns, PosteriorAnalysis]):
+    """What evidence says of the inputs of one model."""
+
+    schema = PosteriorStudy
+    analysis = PosteriorAnalysis
+
+    def plan(self, study: PosteriorStudy, folder: ResultsFolder) -> RunPlan:
+        """Return the model and the sampled values of its inputs."""
+        model = load_study_model(study)
+        report_outputs(study, model)
+        check_tables(study, study, model)
+        design = study.design
+        uniforms = designs.draw(design.method, design.n, design.size, len(study.inputs), study.seed)
+        columns = map_inputs(study, model, uniforms)
+        folder.check_same_study(numbers_digest(study, model))
+        return RunPlan(model, columns, np.arange(design.n) // design.size)
+
+    def execute(
+        self,
+        study: PosteriorStudy,
+        plan: RunPlan,
+        folder: ResultsFolder,
+        *,
+        workers: Workers,
+        quiet: bool,
+    ) -> None:
+        """Run the missing runs of the bank.
+
+        Parameters
+        ----------
+        study : PosteriorStudy
+            Checked study file.
+        plan : RunPlan
+            From ``plan``.
+        folder : ResultsFolder
+            Open for writing.
+        workers : int or str
+            Processes, -1 for one per core, or the address of a dask scheduler.
+        quiet : bool
+            No progress line.
+        """
+        design = study.design
+        run_rows(
+            study, plan.model, plan.columns, folder,
+            design={"method": design.method, "n": design.n, "replicate_size": design.size},
+            replicate=plan.replicate, workers=workers, quiet=quiet,
+        )  # fmt: skip
+
+    def results(self, study: PosteriorStudy, folder: ResultsFolder) -> ModelRuns:
+        """Return the model and the runs of the design."""
+        model = load_study_model(study)
+        runs = folder.runs(columns_of(model))
+        return ModelRuns(model, runs[runs["run"] < study.design.n])
+
+    def analyse(self, study: PosteriorStudy, results: ModelRuns) -> PosteriorAnalysis:
+        """Return every number that the report prints."""
+        return analyse(study, study, results.model, results.runs)
+
+    def subtitle(self, done: Done) -> str:
+        """Return the line below the report's title."""
+        return (
+            f"Evidence of {len(done.study.evidence)} items on a bank of "
+            f"{len(done.results.runs):,} runs of the {done.results.model.name} model, "
+            f"seed {done.study.seed}"
+        )
+
+    def draw(self, done: Done) -> dict[str, Any]:
+        """Return the figures by file name."""
+        return draw(done.analysis)
+
+    def sections(self, done: Done, figures: Mapping[str, Any]) -> Sequence[Section]:
+        """Return the sections of the report."""
+        return sections_of(done.analysis, figures)
+
+    def summarise(self, analysis: PosteriorAnalysis) -> list[str | Table]:
+        """Return target and likelihood ratios."""
+        return summarise(analysis)

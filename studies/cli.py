@@ -6,55 +6,26 @@ Exit codes: 0 done, 1 the study failed, 2 the user's input is wrong, 130 interru
 import os
 import re
 import sys
-from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 
+import studies.folder_commands  # noqa: F401  # registers its commands
 from mcstudy.errors import StudyError, UserError, on_one_line
-from studies.terminal import accept_any_text, print_lines, print_path, print_table
-
-app = typer.Typer(
-    help="Monte Carlo uncertainty and injury-risk studies of crash simulations.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
+from studies.command_line import (
+    Channel,
+    Cluster,
+    Json,
+    Out,
+    Quiet,
+    Study,
+    Workers,
+    app,
+    print_analysis,
+    print_json,
 )
-
-Study = Annotated[Path, typer.Argument(help="Study file (TOML).", show_default=False)]
-Folder = Annotated[Path, typer.Argument(help="Results folder.", show_default=False)]
-Out = Annotated[
-    Path | None, typer.Option(help="Results folder; by default results/<name of the study>.")
-]
-
-
-def _check_workers(value: int) -> int:
-    if value == 0 or value < -1:
-        raise UserError(f"--workers must be 1 or more, or -1 for one per core, given {value}")
-    return value
-
-
-Workers = Annotated[
-    int,
-    typer.Option(
-        help="Worker processes; -1 for one per core, 1 to run in this process (a crash ends it).",
-        callback=_check_workers,
-    ),
-]
-Cluster = Annotated[
-    str | None,
-    typer.Option(help="Address of a dask scheduler (tcp://...), or local, in place of --workers."),
-]
-Channel = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="Of ISO-MME tests: code or file of the head channels to take, with ? and * for any "
-        "characters; may be repeated."
-    ),
-]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Print no progress and no summary.")]
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+from studies.terminal import accept_any_text, print_lines, print_path, print_table
 
 
 @app.command()
@@ -73,7 +44,7 @@ def run(
     folder = api.run_study(study, out=out, workers=where, quiet=quiet or as_json)
     analysis = folder.read_json("analysis.json")
     summary = api.summarise(folder)
-    _print_analysis(analysis, summary, folder.path, quiet=quiet, as_json=as_json)
+    print_analysis(analysis, summary, folder.path, quiet=quiet, as_json=as_json)
 
 
 @app.command()
@@ -84,50 +55,13 @@ def reconstruct(study: Study, out: Out = None, quiet: Quiet = False, as_json: Js
 
     case, tables, folder = api.run_case(study, out=out, quiet=quiet or as_json)
     if as_json:
-        _print_json(dict(case.outputs) | {"status": case.status})
+        print_json(dict(case.outputs) | {"status": case.status})
     elif not quiet:
         for comparison in tables:
             table = as_table(comparison)
             print_table(table.caption, table.head, table.rows)
         print_lines([f"ended: {case.end_reason.replace('_', ' ')}"])
         print_path("report", folder.path / "report.html")
-
-
-@app.command()
-def report(folder: Folder, quiet: Quiet = False, as_json: Json = False) -> None:
-    """Rebuild analysis, figures and report of a results folder without running the model."""
-    from mcstudy.execution.results import ResultsFolder
-    from studies import api
-
-    results = ResultsFolder(folder)
-    analysis = api.build_report(results)
-    summary = api.summarise(results)
-    _print_analysis(analysis, summary, folder, quiet=quiet, as_json=as_json)
-
-
-@app.command()
-def sensitivity(
-    folder: Folder,
-    output: Annotated[
-        list[str] | None, typer.Option(help="An output to rank; may be repeated.")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Report folder; by default sensitivity in the folder.")
-    ] = None,
-    quiet: Quiet = False,
-    as_json: Json = False,
-) -> None:
-    """Estimate the sensitivity of outputs to inputs from the runs of a results folder."""
-    from mcstudy.execution.results import ResultsFolder
-    from studies.sensitivity import measure as sensitivity
-    from studies.sensitivity import report as sensitivity_report
-
-    target = ResultsFolder(out or folder / "sensitivity")
-    analysis = sensitivity.measure_sensitivity(
-        ResultsFolder(folder), target, outputs=output or (), quiet=quiet or as_json
-    )
-    summary = sensitivity_report.summarise(analysis)
-    _print_analysis(analysis, summary, target.path, quiet=quiet, as_json=as_json)
 
 
 @app.command("fit-stiffness")
@@ -156,7 +90,7 @@ def fit_stiffness(
         quiet=quiet or as_json,
     )  # fmt: skip
     summary = [stiffness_report.summary_table(analysis), *analysis.notes]
-    _print_analysis(analysis, summary, folder.path, quiet=quiet, as_json=as_json)
+    print_analysis(analysis, summary, folder.path, quiet=quiet, as_json=as_json)
 
 
 @app.command("risk-curve")
@@ -184,7 +118,7 @@ def risk_curve(
     folder = ResultsFolder(out or Path("results") / name)
     analysis = risk_curve.fit_risk_curves(cases, stimulus, folder, level=level, scenario=scenario)
     summary = [*risk_curve.summarise(analysis), *risk_curve.tables(analysis)]
-    _print_analysis(analysis, summary, folder.path, quiet=quiet, as_json=as_json)
+    print_analysis(analysis, summary, folder.path, quiet=quiet, as_json=as_json)
 
 
 @app.command()
@@ -214,7 +148,7 @@ def diagnose(
         quiet=quiet or as_json,
     )  # fmt: skip
     summary = [*diagnosis_report.summarise(answer), *diagnosis_report.table_of(answer)]
-    _print_analysis(answer, summary, folder.path, quiet=quiet, as_json=as_json)
+    print_analysis(answer, summary, folder.path, quiet=quiet, as_json=as_json)
 
 
 @app.command()
@@ -251,13 +185,13 @@ def validate(
         found = full.validate_full_scale(
             target, Path("configs/accidents.toml"), sets=full_scale, workers=workers
         )
-        _print_analysis(found, full.summarise(found), target.path, quiet=quiet, as_json=as_json)
+        print_analysis(found, full.summarise(found), target.path, quiet=quiet, as_json=as_json)
         return
 
     if diagnosis:
         target = ResultsFolder(out or Path("results/validation_diagnosis"))
         found = tier.validate_diagnosis(target, sets=sets, workers=workers, quiet=quiet or as_json)
-        _print_analysis(found, tier.summarise(found), target.path, quiet=quiet, as_json=as_json)
+        print_analysis(found, tier.summarise(found), target.path, quiet=quiet, as_json=as_json)
         if missed := tier.failed(found):
             raise StudyError(f"targets missed: {'; '.join(missed)}")
         return
@@ -267,26 +201,8 @@ def validate(
     )
     counts = ", ".join(f"{n} {word}" for word, n in analysis["counts"].items())
     summary = [report.table_of(analysis), f"{len(analysis['checks'])} checks: {counts}"]
-    _print_analysis(analysis, summary, folder.path, quiet=quiet, as_json=as_json)
+    print_analysis(analysis, summary, folder.path, quiet=quiet, as_json=as_json)
     report.check_exact(analysis)
-
-
-@app.command()
-def status(folder: Folder, as_json: Json = False) -> None:
-    """Show the progress of the study in a results folder."""
-    from mcstudy.execution.results import ResultsFolder
-
-    results = ResultsFolder(folder)
-    manifest, total = results.read_json("manifest.json"), results.design()["n"]
-    done, counts = results.progress()
-    if as_json:
-        _print_json({"done": done, "total": total, "counts": counts})
-        return
-    detail = ", ".join(f"{n} {name}" for name, n in counts.items())
-    print(
-        f"{manifest.get('study', folder.name)}: {done} of {total} runs done"
-        + (f" ({detail})" if detail else "")
-    )
 
 
 @app.command()
@@ -301,13 +217,13 @@ def models(
 
     if name is None:
         if as_json:
-            _print_json({"models": list(catalogue.model_names())})
+            print_json({"models": list(catalogue.model_names())})
         else:
             print("\n".join(catalogue.model_names()))
         return
     described = catalogue.describe(name)
     if as_json:
-        _print_json(described)
+        print_json(described)
         return
     for title in ("inputs", "outputs"):
         rows = described[title]
@@ -328,7 +244,7 @@ def effects(
     from studies import listing as catalogue
 
     if as_json:
-        _print_json(
+        print_json(
             {"effects": catalogue.describe_effects()}
             if name is None
             else catalogue.describe_effect(name)
@@ -374,34 +290,12 @@ def vehicle(
     summary = understand_surface(mesh, unit, lift)
     picture = draw_summary(summary, out or Path("results") / f"vehicle_{Path(mesh).stem}")
     if as_json:
-        _print_json(summary.numbers() | {"picture": str(picture)})
+        print_json(summary.numbers() | {"picture": str(picture)})
     elif not quiet:
         table = summary.table()
         print_table(table.caption, table.head, table.rows)
         print_lines(summary.notes)
         print_path("picture", picture)
-
-
-def _print_analysis(
-    analysis: Any, summary: Iterable[Any], path: Path, *, quiet: bool, as_json: bool
-) -> None:
-    if as_json:
-        _print_json({"folder": str(path), "analysis": analysis})
-        return
-    if quiet:
-        return
-    for part in summary:
-        if isinstance(part, str):
-            print_lines([part])
-        else:
-            print_table(part.caption, part.head, part.rows)
-    print_path("report", path / "report.html")
-
-
-def _print_json(content: dict[str, Any]) -> None:
-    from mcstudy.execution.results import to_json
-
-    sys.stdout.write(to_json(content))
 
 
 def main() -> None:

@@ -22,7 +22,7 @@ NAMES = {
 
 
 def draw_densities(
-    curves: Mapping[str, Sequence[float]], label: str, interval: tuple[float, float]
+    curves: Mapping[str, Sequence[float]], label: str, unit: str, interval: tuple[float, float]
 ) -> Figure:
     """Return prior and posterior densities.
 
@@ -30,8 +30,8 @@ def draw_densities(
     ----------
     curves : mapping
         Densities by name, and their ``grid``.
-    label : str
-        Axis label with unit.
+    label, unit : str
+        Axis label with unit, and that unit.
     interval : pair of float
         Central 95 % interval of the posterior, which is shaded.
     """
@@ -44,7 +44,8 @@ def draw_densities(
     height = np.array(curves["posterior"])[inside]
     band = Band(grid[inside], np.zeros(height.size), height, "95 % interval", colour=style.BLUE)
     return draw_panels(
-        [Panel(label, "density", lines, [band], ylim=(0.0, None), legend="upper right")],
+        [Panel(label, f"density [1/({unit})]", lines, [band], ylim=(0.0, None),
+               legend="upper right")],
         width=6.4, height=3.8,
     )  # fmt: skip
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from mcstudy import units
-from mcstudy.errors import StudyError
+from mcstudy.errors import StudyError, UserError
 from mcstudy.injury.functions import risk_function
 from mcstudy.posterior.calibration import (
     BINS,
@@ -21,7 +21,7 @@ from mcstudy.posterior.calibration import (
 from mcstudy.posterior.evidence import Bank, Item
 from mcstudy.posterior.inference import Draws, Posterior
 from mcstudy.posterior.joint_coverage import measure_joint_coverage
-from mcstudy.posterior.kernel import effective_size, weighted_quantile
+from mcstudy.posterior.kernel import LEAST, effective_size, weighted_quantile
 from mcstudy.posterior.prior_check import PriorCheck, check_prior
 from mcstudy.posterior.ratio import Proposition, Ratio, measure_ratio
 from mcstudy.posterior.weights import tilt
@@ -80,6 +80,11 @@ class _Case:
     ) -> None:
         self.tables, self.model, self.study = tables, model, study
         self.bank: Bank = bank_of(runs, model)
+        if self.bank.size < LEAST:
+            raise UserError(
+                f"only {self.bank.size} runs are complete, and a posterior takes {LEAST}; run the "
+                "study again to go on"
+            )
         self.items = items_of(tables, model)
         self.weights = prior_weights(tables, study, self.bank, model)
         self.unit = study.inputs[tables.target].unit
@@ -153,6 +158,8 @@ def analyse(
 
     Raises
     ------
+    UserError
+        If too few runs are complete.
     StudyError
         If no run agrees with the evidence.
     """

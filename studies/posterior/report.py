@@ -32,7 +32,10 @@ def draw(analysis: PosteriorAnalysis) -> dict[str, Any]:
     others |= {entry.label: _ends(entry.target) for entry in analysis.assumptions}
     return failure_map(analysis) | {
         "posterior": figures_of.draw_densities(
-            analysis.curves, label, analysis.after.intervals["0.95"]
+            analysis.curves,
+            label,
+            shown_unit(analysis.unit) or "–",
+            analysis.after.intervals["0.95"],
         ),
         "evidence": figures_of.draw_forest(rows, label),
         "assumptions": figures_of.draw_forest(others, label),
@@ -170,7 +173,7 @@ def _ratios(analysis: PosteriorAnalysis) -> Section:
         "is true, or is not, is the prior cut to it."
     ]
     if analysis.refused:
-        return Section("Propositions", [f"None is given: {analysis.refused}."])
+        return Section("Propositions", [f"No ratio is given: {analysis.refused}."])
     if not analysis.ratios:
         return Section("Propositions", ["The study states none."])
     said.append(
@@ -360,5 +363,5 @@ def _recorded(injury: InjuryResult) -> str:
         if str(injury.recorded) in row
     ]
     if not shares:
-        return " None of the risk functions has this level."
+        return " No risk function has this level."
     return f" As bad or worse with a probability of {' and '.join(shares)}."

@@ -93,6 +93,7 @@ DESIGNS = {
     "map": "n = 12\nreplicate_size = 4",
     "multi-fidelity": "cpu_time = 60.0",
     "model-chain": "n = 60\nreplicate_size = 10",
+    "posterior": 'method = "sobol"\nn = 128\nreplicate_size = 64',
 }
 GRID = """
 [axes.impact_angle]
@@ -102,6 +103,19 @@ last = 10.0
 step = 5.0
 [axes.friction_body_car]
 values = [0.2, 0.25]
+"""
+EVIDENCE = """
+[evidence.hic15]
+value = 600.0
+sd = 60.0
+[evidence.peak_force]
+value = 4000.0
+unit = "N"
+sd = 400.0
+[propositions."above 30 km/h"]
+of = "impact_speed"
+above = 30.0
+unit = "km/h"
 """
 # A hood of 1 kN/m times a scale: below SOFTEST the contact lasts more than a second and the run
 # fails, which one run in twenty does.
@@ -152,12 +166,15 @@ def study_text(
         text += f"\n[design]\n{design or DESIGNS[kind]}\n{inputs}{more}"
     if kind == "injury":
         return text + INJURY
+    if kind == "posterior":
+        text += EVIDENCE
     if kind == "map":
         text += GRID
     extra = {
         "monte-carlo": "histories = 0",
         "model-comparison": "",
         "model-chain": "",
+        "posterior": "",
         "map": "limits.hic15 = [250.0, 400.0]",
         "multi-fidelity": "limits.hic15 = [250.0]\n"
         'risks = [{ function = "nhtsa_lognormal", level = 3, age = 8.0 }]',

@@ -46,6 +46,7 @@ LARGER = {
     "map": "n = 20\nreplicate_size = 4",
     "multi-fidelity": "cpu_time = 120.0",
     "model-chain": "n = 80\nreplicate_size = 10",
+    "posterior": 'method = "sobol"\nn = 192\nreplicate_size = 64',
 }
 FIGURES = {
     "monte-carlo": {"distributions", "rank_correlation", "convergence", "impact_speed"},
@@ -56,6 +57,7 @@ FIGURES = {
     "map": {"map_hic15", "exceedance_hic15"},
     "multi-fidelity": {"exceedance_hic15"},
     "model-chain": {"split_hic15"},
+    "posterior": {"posterior", "evidence", "assumptions", "ranks"},
 }
 SOFT = FAILING.replace("median = 8.4", "median = 2.0")
 """Hoods of which one in ten is too soft."""
@@ -373,7 +375,13 @@ def test_an_unfinished_folder_tells_to_go_on_or_reports_its_whole_parts(
     if kind in ("injury", "model-comparison", "multi-fidelity", "model-chain"):
         assert "run the study again" in told(answer)
         return
-    wanted = {"monte-carlo": 119, "sobol": 50 // 6 * 6, "morris": 50 // 5 * 5, "map": 66}[kind]
+    wanted = {
+        "monte-carlo": 119,
+        "sobol": 50 // 6 * 6,
+        "morris": 50 // 5 * 5,
+        "map": 66,
+        "posterior": 127,
+    }[kind]
     assert json.loads(answer.out)["analysis"]["runs"] == wanted
     if kind in ("sobol", "morris"):
         shutil.rmtree(folder.path)

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import Workers
@@ -104,3 +105,7 @@ class PosteriorOf(StudyKind[PosteriorStudy, RunPlan, ModelRuns, PosteriorAnalysi
     def summarise(self, analysis: PosteriorAnalysis) -> list[str | Table]:
         """Return target and likelihood ratios."""
         return summarise(analysis)
+
+    def independent_rows(self, runs: pd.DataFrame, folder: ResultsFolder) -> pd.DataFrame:
+        """Return all runs: the bank is a sample of the priors."""
+        return runs

@@ -12,6 +12,7 @@ from studies.validation import (
     ground_impact,
     head_impact,
     headform_impacts,
+    hidden_speeds,
     numerics,
     standing_child,
     throw_distance,
@@ -27,6 +28,7 @@ PARTS: dict[str, Callable[[int], Part]] = {
     "standing-child": standing_child.validate,
     "edge": edge_passage.validate,
     "numerics": numerics.validate,
+    "speed": hidden_speeds.validate,
 }
 MEASURED: dict[str, Callable[[int, Path], Part]] = {
     "trunk": trunk_impacts.validate,

@@ -20,7 +20,7 @@ MEAN, SD = 50.0, 10.0
 
 
 def bank_of(n: int, seed: int = 0) -> Bank:
-    """Speed N(50, 10); first output speed + N(0, 5), second half of it + N(0, 3); one more input."""
+    """Speed N(50, 10); outputs speed + N(0, 5) and half of it + N(0, 3); one more input."""
     z = stats.norm.ppf(stats.qmc.Sobol(4, seed=seed).random(n))
     speed = MEAN + SD * z[:, 0]
     return Bank(

@@ -96,7 +96,7 @@ def test_what_is_asked_for_beside_the_speed(bank: ResultsFolder, tmp_path: Path)
         'format = "mcstudy-evidence/1"\ntitle = "More"\nalso = ["headform_mass"]\n'
         + EVIDENCE
         + "[discrepancy.hic15]\nrelative = 0.1\n"
-        "[measurements.headform_mass]\nsd = 0.01\nunit = \"kg\"\n"
+        '[measurements.headform_mass]\nsd = 0.01\nunit = "kg"\n'
         "[measurements.hood_force_scale]\nsd = 0.01\n"
         "[injury]\nrecorded = 3\nage = 8.0\n"
     )

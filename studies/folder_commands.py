@@ -81,7 +81,7 @@ def infer(
 ) -> None:
     """Infer the speed, or another input, from evidence and the runs of a results folder."""
     from mcstudy.execution.results import ResultsFolder
-    from studies.posterior import infer as inference
+    from studies.inference import evidence as inference
     from studies.posterior.report import summarise
 
     target = ResultsFolder(out or folder / f"posterior_{evidence.stem}")
@@ -108,7 +108,7 @@ def contours(
 ) -> None:
     """Draw an output over an input as a family of curves with bands, from a results folder."""
     from mcstudy.execution.results import ResultsFolder
-    from studies.posterior.contours import write_contours
+    from studies.inference.contours import write_contours
 
     target = ResultsFolder(out or folder / "contours")
     analysis, summary = write_contours(

@@ -19,8 +19,8 @@ from headform_studies import (
 
 from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder
+from studies.inference.evidence import posterior_draws, to_inference_data
 from studies.kinds import load_study
-from studies.posterior.infer import posterior_draws, to_inference_data
 
 DESIGN = 'method = "sobol"\nn = 2048\nreplicate_size = 1024'
 FILE = f'format = "mcstudy-evidence/1"\ntitle = "Other evidence"\n{EVIDENCE}'

@@ -17,8 +17,8 @@ from mcstudy.report import Section, Table
 from mcstudy.studyfile.schema import SampledStudy
 from mcstudy.text import capital, number, quantity
 from models.protocol import Model
+from studies.inference.evidence import load_bank
 from studies.posterior.evidence import bank_of, units_of
-from studies.posterior.infer import load_bank
 from studies.publishing import publish
 
 ROWS = 8

@@ -1,0 +1,1 @@
+"""What evidence says on the runs of any sampled results folder, and contours of these runs."""

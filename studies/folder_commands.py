@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from studies.command_line import Folder, Json, Quiet, app, print_analysis, print_json
+from studies.terminal import print_path
 
 
 @app.command()
@@ -61,6 +62,35 @@ def status(folder: Folder, as_json: Json = False) -> None:
         f"{manifest.get('study', folder.name)}: {done} of {total} runs done"
         + (f" ({detail})" if detail else "")
     )
+
+
+@app.command()
+def view(
+    folder: Folder,
+    run: Annotated[
+        list[int], typer.Option(help="Number of a run; may be repeated.", show_default=False)
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="HTML file; by default viewer.html in the folder.")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Run rows of a study again and write them as one page in three dimensions."""
+    from mcstudy.errors import UserError
+    from mcstudy.execution.results import ResultsFolder
+    from studies import api
+    from studies.viewing import view_runs
+
+    results = ResultsFolder(folder)
+    runs = {f"run {k}": api.rerun(results, k) for k in dict.fromkeys(run)}
+    page = view_runs(f"{folder.name}: {', '.join(runs)}", runs)
+    if not page:
+        raise UserError(f"{folder}: the model of this study has no scene to view")
+    target = out or folder / "viewer.html"
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(page, encoding="utf-8")
+    if not quiet:
+        print_path("viewer", target)
 
 
 @app.command()

@@ -23,6 +23,7 @@ from studies.published_tables import PublishedTable, as_table, compare_with_tabl
 from studies.reconstruction.schema import Reconstruction
 from studies.reconstruction.variants import VariantOutcome, variant_ranges, variant_table
 from studies.runs import load_study_model
+from studies.viewing import view_runs
 
 LONG = 5.0
 """CPU time (s) of a run from which on its progress is shown."""
@@ -193,6 +194,7 @@ def write_reconstruction(
         style.save(figures, folder.path / "figures")
         animations = {}
         if run.scene is not None:
+            folder.write_text("viewer.html", view_runs(study.title, {model.name: run}))
             gif = folder.path / "figures" / "crash.gif"
             crash.write_animation(run.scene, gif)
             animations["The whole crash, from the side and from above."] = gif.read_bytes()

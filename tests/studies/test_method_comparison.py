@@ -69,6 +69,9 @@ def test_writes_report_figures_and_histories(case: tuple[Answer, ResultsFolder])
     for words in ("published mean", "our mean", "MBS model", "FEM model", "accident"):
         assert words in html
     assert folder.history(1)["head"].shape[0] > 1000
+    page = (folder.path / "viewer.html").read_text()
+    assert '"label": "multibody"' in page
+    assert '"label": "facet"' in page
     assert "drawn again by 'mcstudy run'" in told(mcstudy("report", folder.path))
 
 

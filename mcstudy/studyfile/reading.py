@@ -63,6 +63,13 @@ def first_problem(error: ValidationError, table: Mapping[str, Any]) -> str:
         return f"{place}: unknown key"
     if kind == "missing":
         return f"{place}: missing"
+    if kind == "union_tag_invalid":
+        told = problem["ctx"]
+        name, known = (
+            str(told[key]).replace("'", "") for key in ("discriminator", "expected_tags")
+        )
+        given = on_one_line(repr(told["tag"]), 60)
+        return f"{place}: {name} {given} is none of {known}"
     message = on_one_line(problem["msg"].removeprefix("Value error, "), LONGEST)
     given = problem.get("input")
     shown = (

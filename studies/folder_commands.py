@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from studies.command_line import Folder, Json, Quiet, app, print_analysis, print_json
-from studies.terminal import print_path
+from studies.terminal import print_lines, print_path
 
 
 @app.command()
@@ -68,20 +68,31 @@ def status(folder: Folder, as_json: Json = False) -> None:
 def view(
     folder: Folder,
     run: Annotated[
-        list[int], typer.Option(help="Number of a run; may be repeated.", show_default=False)
-    ],
-    out: Annotated[
-        Path | None, typer.Option(help="HTML file; by default viewer.html in the folder.")
+        list[int] | None, typer.Option(help="Number of a run to write as a page; may be repeated.")
     ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="HTML file of --run; by default viewer.html in the folder.")
+    ] = None,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port of the server; 0 for a free one.")
+    ] = 0,
     quiet: Quiet = False,
 ) -> None:
-    """Run rows of a study again and write them as one page in three dimensions."""
+    """Serve a study on this machine: its explorer and any run in 3-D; or write runs as a page."""
     from mcstudy.errors import UserError
     from mcstudy.execution.results import ResultsFolder
+
+    results = ResultsFolder(folder)
+    if not run:
+        from studies.serving import serve_study
+
+        with serve_study(results, port) as server:
+            print_lines([f"{server.address} (Ctrl-C ends it)"])
+            server.serve_forever()
+        return
     from studies import api
     from studies.viewing import view_runs
 
-    results = ResultsFolder(folder)
     runs = {f"run {k}": api.rerun(results, k) for k in dict.fromkeys(run)}
     page = view_runs(f"{folder.name}: {', '.join(runs)}", runs)
     if not page:

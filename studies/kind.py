@@ -114,6 +114,8 @@ class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
         results = self.results(study, folder)
         analysis = self.analyse(study, results)
         done = partial(Finished, study, results)
+        for name, page in self.pages(study, results, folder).items():
+            folder.write_text(name, page)
         return publish(
             folder,
             study.title,
@@ -197,6 +199,20 @@ class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
         self, done: Finished[Study, Results, Analysis], figures: Mapping[str, Any]
     ) -> Sequence[Section]:
         """Return the sections of the report, from what ``draw`` returns."""
+
+    def pages(self, study: Study, results: Results, folder: ResultsFolder) -> Mapping[str, str]:
+        """Return pages beside the report by file name; none unless a kind has some.
+
+        Parameters
+        ----------
+        study : AnyStudy
+            Study file of this kind, checked.
+        results : Results
+            From ``results``.
+        folder : ResultsFolder
+            Results folder of the study.
+        """
+        return {}
 
     @abstractmethod
     def summarise(self, analysis: Analysis) -> Sequence[str | Table]:

@@ -55,13 +55,13 @@ def pack_run(run: ViewedRun) -> dict[str, Any]:
     frames = _frames(scene.time)
     return {
         "label": run.label,
-        "time": _pack(scene.time[frames]),
+        "time": pack_array(scene.time[frames]),
         "names": list(scene.names),
         "axes": np.asarray(scene.semi_axes).tolist(),
-        "centre": _pack(scene.centre[frames]),
-        "orientation": _pack(scene.orientation[frames]),
-        "car": _pack(scene.car[frames]),
-        "outline": [_pack(np.asarray(line)) for line in scene.outline],
+        "centre": pack_array(scene.centre[frames]),
+        "orientation": pack_array(scene.orientation[frames]),
+        "car": pack_array(scene.car[frames]),
+        "outline": [pack_array(np.asarray(line)) for line in scene.outline],
         "half_width": float(np.abs(scene.plan[:, 1]).max()),
         "meshes": [_pack_mesh(mesh) for mesh in scene.meshes],
         "curves": [_pack_curve(curve) for curve in run.curves],
@@ -77,7 +77,15 @@ def _frames(time: Array) -> NDArray[np.int64]:
     return np.unique(np.clip(np.searchsorted(time, wanted - 1e-6), 0, len(time) - 1))
 
 
-def _pack(values: NDArray[Any], kind: str = "<f4") -> str:
+def pack_array(values: NDArray[Any], kind: str = "<f4") -> str:
+    """Return an array as base64 text, little-endian.
+
+    Parameters
+    ----------
+    values : array
+    kind : str
+        Type of its numbers.
+    """
     return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")
 
 
@@ -87,18 +95,18 @@ def _pack_mesh(mesh: MeshLike) -> dict[str, Any]:
     packed: dict[str, Any] = {
         "body": mesh.body,
         "car": mesh.body == CAR,
-        "nodes": _pack(first),
-        "faces": _pack(triangles(mesh.faces), "<u4"),
+        "nodes": pack_array(first),
+        "faces": pack_array(triangles(mesh.faces), "<u4"),
     }
     if nodes.ndim == 3 and mesh.time is not None:
         film = np.unique(np.linspace(0, len(nodes) - 1, FILM).round().astype(int))
         change = nodes[film] - first
         moved = np.flatnonzero(np.linalg.norm(change, axis=2).max(axis=0) > MOVED)
         packed |= {
-            "film_time": _pack(mesh.time[film]),
-            "moved": _pack(moved, "<u4"),
+            "film_time": pack_array(mesh.time[film]),
+            "moved": pack_array(moved, "<u4"),
             "step": STEP,
-            "change": _pack(np.round(change[:, moved] / STEP), "<i2"),
+            "change": pack_array(np.round(change[:, moved] / STEP), "<i2"),
         }
     return packed
 
@@ -109,6 +117,6 @@ def _pack_curve(curve: Curve) -> dict[str, Any]:
     kept = np.concatenate([early, late])
     return {
         "label": curve.label,
-        "time": _pack(curve.time[kept]),
-        "values": _pack(curve.values[kept]),
+        "time": pack_array(curve.time[kept]),
+        "values": pack_array(curve.values[kept]),
     }

@@ -1,8 +1,9 @@
-"""The page of the viewer."""
+"""The pages of viewer and explorer."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
+from typing import Any
 
 from jinja2 import Environment
 
@@ -19,16 +20,40 @@ def render_viewer(title: str, runs: Sequence[ViewedRun]) -> str:
     runs : sequence of ViewedRun
         At least one; the first one is solid, the others are ghosts over it or stand beside it.
     """
+    content = {"title": title, "runs": [pack_run(run) for run in runs]}
+    return render_page("viewer", title, content, styles=("viewer.css",), library=three_js())
+
+
+def render_page(
+    name: str,
+    title: str,
+    content: Mapping[str, Any],
+    *,
+    styles: Sequence[str],
+    library: str = "",
+) -> str:
+    """Return a page from its template, style and program, with its content inside.
+
+    Parameters
+    ----------
+    name : str
+        Of template and program.
+    title : str
+    content : mapping
+        What the program shows, JSON-able.
+    styles : sequence of str
+        Files of the style.
+    library : str
+        Script that the program uses.
+    """
     folder = files("mcstudy.viewer")
-    parts = {name: folder.joinpath(name).read_text("utf-8") for name in ("viewer.css", "viewer.js")}
-    content = json.dumps({"title": title, "runs": [pack_run(run) for run in runs]})
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    template = environment.from_string(folder.joinpath("viewer.html").read_text("utf-8"))
+    template = environment.from_string(folder.joinpath(f"{name}.html").read_text("utf-8"))
     return template.render(
         title=title,
-        style=parts["viewer.css"],
-        library=three_js().replace("</script", "<\\/script"),
-        program=parts["viewer.js"],
+        style="\n".join(folder.joinpath(style).read_text("utf-8") for style in styles),
+        library=library.replace("</script", "<\\/script"),
+        program=folder.joinpath(f"{name}.js").read_text("utf-8"),
         # Text of users must not end the script that holds it.
-        content=content.replace("<", "\\u003c"),
+        content=json.dumps(content).replace("<", "\\u003c"),
     )

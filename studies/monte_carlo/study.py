@@ -12,6 +12,7 @@ from mcstudy.report import Section, Table
 from mcstudy.studyfile.identity import numbers_digest
 from mcstudy.studyfile.study_outputs import report_outputs
 from models.protocol import Model
+from studies.explorer import explore_runs
 from studies.kind import Finished, StudyKind
 from studies.monte_carlo.analysis import MonteCarloAnalysis, analyse, marks_of
 from studies.monte_carlo.design import sample_inputs
@@ -90,6 +91,12 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns, MonteCarloAnalys
     def draw(self, done: Done) -> dict[str, Any]:
         """Return the figures by file name."""
         return draw(done.study, done.results.model, done.results.runs, done.analysis)
+
+    def pages(
+        self, study: MonteCarloStudy, results: ModelRuns, folder: ResultsFolder
+    ) -> Mapping[str, str]:
+        """Return the explorer of the runs."""
+        return {"explorer.html": explore_runs(study, results.model, results.runs, folder.path)}
 
     def sections(self, done: Done, figures: Mapping[str, Any]) -> Sequence[Section]:
         """Return the sections of the report."""

@@ -17,6 +17,7 @@ from mcstudy.sampling import designs
 from mcstudy.studyfile.identity import numbers_digest
 from mcstudy.studyfile.study_inputs import map_inputs
 from mcstudy.studyfile.study_outputs import report_outputs
+from studies.explorer import explore_runs
 from studies.kind import Finished, StudyKind
 from studies.posterior.analysis import analyse
 from studies.posterior.evidence import check_tables
@@ -97,6 +98,12 @@ class PosteriorOf(StudyKind[PosteriorStudy, RunPlan, ModelRuns, PosteriorAnalysi
     def draw(self, done: Done) -> dict[str, Any]:
         """Return the figures by file name."""
         return draw(done.analysis)
+
+    def pages(
+        self, study: PosteriorStudy, results: ModelRuns, folder: ResultsFolder
+    ) -> Mapping[str, str]:
+        """Return the explorer of the runs."""
+        return {"explorer.html": explore_runs(study, results.model, results.runs, folder.path)}
 
     def sections(self, done: Done, figures: Mapping[str, Any]) -> Sequence[Section]:
         """Return the sections of the report."""

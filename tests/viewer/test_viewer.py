@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mcstudy.viewer import Curve, ViewedRun, render_viewer
+from mcstudy.viewer import Column, Curve, ViewedRun, render_explorer, render_viewer
 from mcstudy.viewer.content import pack_run
 from mcstudy.viewer.library import three_js
 from models.protocol import Mesh, Scene
@@ -19,7 +19,7 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 FLAGS = (
     "--headless=new", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-sync",
     "--disable-background-networking", "--disable-component-update", "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader", "--window-size=1280,1000",
+    "--enable-unsafe-swiftshader", "--window-size=1280,1000", "--virtual-time-budget=3000",
 )  # fmt: skip
 
 
@@ -107,20 +107,26 @@ def test_the_page_needs_no_network_and_holds_what_users_write_as_text() -> None:
     assert len(html) < 1.2e6
 
 
+def opened(html: str, place: str, tmp_path: Path) -> str:
+    """Return what a browser made of a page on the disk."""
+    (tmp_path / "page.html").write_text(html, encoding="utf-8")
+    address = (tmp_path / "page.html").as_uri() + "#" + place
+    command = [str(CHROMIUM), *FLAGS, f"--user-data-dir={tmp_path / 'user'}", "--dump-dom", address]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert "<body" in done.stdout, done.stderr[-2000:]
+    return done.stdout
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt install chromium")
 @pytest.mark.parametrize("place", ["t=0.1", "t=0.3&arrangement=beside&view=side", "play=1"])
 def test_a_browser_shows_it_from_the_disk_without_an_error(place: str, tmp_path: Path) -> None:
-    (tmp_path / "viewer.html").write_text(page(), encoding="utf-8")
-    address = (tmp_path / "viewer.html").as_uri() + "#" + place
-    command = [str(CHROMIUM), *FLAGS, f"--user-data-dir={tmp_path / 'user'}",
-               "--virtual-time-budget=3000", "--dump-dom", address]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-    body = re.search(r"<body[^>]*>", done.stdout)
-    assert body is not None, done.stderr[-2000:]
+    dom = opened(page(), place, tmp_path)
+    body = re.search(r"<body[^>]*>", dom)
+    assert body is not None
     assert 'data-ready="1"' in body[0]
     assert "data-error" not in body[0]
-    assert '<canvas data-engine="three.js' in done.stdout
-    clock = re.search(r'<output id="clock"[^>]*>([^<]*)</output>', done.stdout)
+    assert '<canvas data-engine="three.js' in dom
+    clock = re.search(r'<output id="clock"[^>]*>([^<]*)</output>', dom)
     assert clock is not None
     if place.startswith("t="):
         assert clock[1] == f"{1000.0 * float(place[2:5]):.0f} ms"
@@ -128,4 +134,51 @@ def test_a_browser_shows_it_from_the_disk_without_an_error(place: str, tmp_path:
         frames = re.search(r'data-frames="(\d+)"', body[0])
         assert frames is not None and int(frames[1]) > 1
         assert clock[1] != "0 ms"
-    assert re.search(r'<p id="problem"[^>]*hidden', done.stdout)
+    assert re.search(r'<p id="problem"[^>]*hidden', dom)
+
+
+RUNS = 2000
+SPEED = np.random.default_rng(1).uniform(5.0, 20.0, RUNS)
+
+
+def explorer(*, address: str = "") -> str:
+    rng = np.random.default_rng(2)
+    hic = SPEED**2.5 * rng.uniform(0.5, 1.5, RUNS)
+    status = np.where(rng.random(RUNS) < 0.1, "no_head_contact", "ok")
+    hic[status != "ok"] = np.nan
+    columns = [
+        Column("impact_speed", "impact speed [m/s]", SPEED),
+        Column("hic15", "HIC15 [–]", hic),
+        Column("constant", "constant [–]", np.full(RUNS, 2.0)),
+    ]
+    return render_explorer(
+        "Runs </script><b>", "results/x", np.arange(RUNS), status.tolist(), columns,
+        ["hic15", "impact_speed"], address=address,
+    )  # fmt: skip
+
+
+def test_the_explorer_holds_the_runs_and_no_markup_of_users() -> None:
+    html = explorer()
+    assert "Runs </script>" not in html
+    assert not re.search(r"https?://|@import|url\(", html)
+    content = re.search(r'(?s)id="content">(.*?)</script>', html)
+    assert content is not None
+    held = json.loads(content[1])
+    assert [column["name"] for column in held["columns"]] == ["hic15", "impact_speed", "constant"]
+    assert [column["shown"] for column in held["columns"]] == [True, True, False]
+    np.testing.assert_allclose(floats(held["columns"][1]["values"]), SPEED, rtol=1e-6)
+    assert sum(state["count"] for state in held["statuses"]) == RUNS
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt install chromium")
+def test_a_browser_chooses_the_runs_between_two_values_and_picks_one(tmp_path: Path) -> None:
+    dom = opened(explorer(), "impact_speed=10:12&run=17", tmp_path)
+    body = re.search(r"<body[^>]*>", dom)
+    assert body is not None
+    assert 'data-ready="1"' in body[0]
+    assert "data-error" not in body[0]
+    inside = int(((SPEED >= 10.0) & (SPEED <= 12.0)).sum())
+    assert f'data-chosen="{inside}"' in body[0]
+    assert 'data-picked="17"' in body[0]
+    assert "mcstudy view results/x --run 17" in dom
+    assert f"{inside:,} of {RUNS:,} runs" in dom

@@ -105,13 +105,14 @@
     pen.globalAlpha = 1;
     if (picked >= 0) { pen.beginPath(); line(picked); pen.strokeStyle = ink.mark; pen.lineWidth = 2.5; pen.stroke(); }
     pen.font = "12px system-ui, sans-serif"; pen.textAlign = "center";
+    const gap = places.length > 1 ? places[1].x - places[0].x : width, room = Math.max(2 * gap - 70, 60);
     for (const [k, { column, x }] of places.entries()) {
       pen.strokeStyle = style("--ink"); pen.lineWidth = 1;
       pen.beginPath(); pen.moveTo(x, TOP); pen.lineTo(x, height - BOTTOM); pen.stroke();
       pen.fillStyle = style("--ink"); pen.textBaseline = "alphabetic";
       const last = k > 0 && k === places.length - 1;
       pen.textAlign = k === 0 ? "left" : last ? "right" : "center";
-      pen.fillText(column.label, k === 0 ? 4 : last ? width - 4 : x, k % 2 ? 30 : 14, 2 * SIDE + 60);
+      pen.fillText(column.label, k === 0 ? 4 : last ? width - 4 : x, k % 2 ? 30 : 14, room);
       pen.textAlign = "center";
       pen.fillStyle = style("--soft");
       pen.fillText(short(column.high), x, TOP - 3);
@@ -152,6 +153,7 @@
       pen.save(); pen.fillStyle = style("--soft"); pen.textAlign = "right";
       pen.fillText(short(column.high), EDGE - 4, k * size + 8, EDGE - 24); pen.fillText(short(column.low), EDGE - 4, (k + 1) * size - 14, EDGE - 24);
       pen.restore();
+      if (size < 80) return;
       pen.save(); pen.fillStyle = style("--soft"); pen.textAlign = "left"; pen.fillText(short(column.low), EDGE + k * size, rows.length * size + 32);
       pen.textAlign = "right"; pen.fillText(short(column.high), EDGE + (k + 1) * size - 8, rows.length * size + 32); pen.restore();
     });

@@ -34,12 +34,18 @@ def run(
     out: Out = None,
     workers: Workers = -1,
     cluster: Cluster = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say runs, time and memory to expect; run nothing.")
+    ] = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
     """Run a study, or resume it where it stopped, and write its report."""
     from studies import api
 
+    if dry_run:
+        _expect(study, out, workers, as_json=as_json)
+        return
     where = workers if cluster is None else cluster
     folder = api.run_study(study, out=out, workers=where, quiet=quiet or as_json)
     analysis = folder.read_json("analysis.json")
@@ -296,6 +302,23 @@ def vehicle(
         print_table(table.caption, table.head, table.rows)
         print_lines(summary.notes)
         print_path("picture", picture)
+
+
+def _expect(path: Path, out: Path | None, workers: int, *, as_json: bool) -> None:
+    """Print what a study takes."""
+    from dataclasses import asdict
+
+    from studies import api, expectation
+    from studies.kinds import load_study
+
+    study = load_study(path)
+    expected = expectation.expect_study(study, api.results_folder(study, out))
+    if as_json:
+        print_json({label: asdict(entry) for label, entry in expected.items()})
+        return
+    table = expectation.expectation_table(expected, workers)
+    print_table(table.caption, table.head, table.rows)
+    print_lines(expectation.expectation_notes(study))
 
 
 def main() -> None:

@@ -13,7 +13,6 @@ from studies.terminal import print_lines, print_path, print_table
 app = typer.Typer(
     help="Monte Carlo uncertainty and injury-risk studies of crash simulations.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 

@@ -4,6 +4,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import TextIO
 
+from rich import box
 from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text
@@ -50,12 +51,24 @@ def print_table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]]
     rows : iterable of sequence of str
         Cells by row.
     """
-    shown = RichTable(title=Text(printable(caption)) if caption else None)
+    shown = RichTable(
+        title=Text(printable(caption)) if caption else None,
+        box=box.HEAVY_HEAD if _draws_lines() else box.ASCII,
+    )
     for name in head:
         shown.add_column(Text(printable(name)), overflow="fold")
     for row in rows:
         shown.add_row(*(Text(printable(cell)) for cell in row))
     _console().print(shown)
+
+
+def _draws_lines() -> bool:
+    """Return whether the output's encoding has the characters of a table's lines."""
+    try:
+        "━┃│".encode(getattr(sys.stdout, "encoding", None) or "utf-8")
+    except (UnicodeEncodeError, LookupError):
+        return False
+    return True
 
 
 def _console() -> Console:

@@ -1,7 +1,5 @@
 """The explorer of a sampled study: its runs, inputs and outputs on one page."""
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 
@@ -17,7 +15,7 @@ STRONGEST = 3
 
 
 def explore_runs(
-    study: SampledStudy, model: Model, runs: pd.DataFrame, folder: Path, *, address: str = ""
+    study: SampledStudy, model: Model, runs: pd.DataFrame, *, address: str = ""
 ) -> str:
     """Return the explorer's page of the runs of a study.
 
@@ -27,8 +25,6 @@ def explore_runs(
     model : Model
     runs : DataFrame
         One row a run.
-    folder : path
-        Results folder, for the command that shows a run.
     address : str
         Start of the address at which a server shows a run; empty for a file.
     """
@@ -52,6 +48,6 @@ def explore_runs(
     }
     drivers = sorted(strength, key=lambda name: -np.nan_to_num(strength[name]))[:STRONGEST]
     return render_explorer(
-        study.title, str(folder), runs["run"].to_numpy(dtype=np.int64), runs["status"].tolist(),
+        study.title, runs["run"].to_numpy(dtype=np.int64), runs["status"].tolist(),
         columns, [*outputs[:STRONGEST], *drivers], address=address,
     )  # fmt: skip

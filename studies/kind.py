@@ -114,7 +114,7 @@ class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
         results = self.results(study, folder)
         analysis = self.analyse(study, results)
         done = partial(Finished, study, results)
-        for name, page in self.pages(study, results, folder).items():
+        for name, page in self.pages(study, results).items():
             folder.write_text(name, page)
         return publish(
             folder,
@@ -200,7 +200,7 @@ class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
     ) -> Sequence[Section]:
         """Return the sections of the report, from what ``draw`` returns."""
 
-    def pages(self, study: Study, results: Results, folder: ResultsFolder) -> Mapping[str, str]:
+    def pages(self, study: Study, results: Results) -> Mapping[str, str]:
         """Return pages beside the report by file name; none unless a kind has some.
 
         Parameters
@@ -209,8 +209,6 @@ class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
             Study file of this kind, checked.
         results : Results
             From ``results``.
-        folder : ResultsFolder
-            Results folder of the study.
         """
         return {}
 

@@ -120,7 +120,7 @@ def serve_study(results: ResultsFolder, port: int = 0) -> Server:
 
     def page(path: str) -> str | None:
         if path == "":
-            return explore_runs(study, model, runs, results.path, address="run/")
+            return explore_runs(study, model, runs, address="run/")
         found = re.fullmatch(r"run/(\d{1,9})", path)
         if found is None:
             return None

@@ -176,6 +176,19 @@ class SampledStudy(CommonStudy, Limits):
         """Return the design settings that change the numbers of a run, by topic."""
 
 
+class DesignedStudy(SampledStudy):
+    """Keys of studies whose runs are one design: a sample of the inputs."""
+
+    design: Design = Design()
+
+    def design_topics(self) -> dict[str, Any]:
+        """Return the parts of the design that affect the values of a run, by topic."""
+        return {
+            "design.method": self.design.method,
+            "design.replicate_size": self.design.size,
+        }
+
+
 class ModelsStudy(AnyStudy, Limits):
     """Keys of studies that run several models, by label, with the same inputs."""
 

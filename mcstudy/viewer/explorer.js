@@ -237,7 +237,7 @@
       frame.src = `${content.address}${runs[row]}`;
       box.append(head, frame, table);
     } else {
-      how.textContent = `To see it: mcstudy view ${content.folder} --run ${runs[row]}`;
+      how.textContent = `To see it: mcstudy view FOLDER --run ${runs[row]}, with the folder of this page`;
       box.append(head, how, table);
     }
   }

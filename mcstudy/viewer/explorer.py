@@ -26,7 +26,6 @@ class Column:
 
 def render_explorer(
     title: str,
-    folder: str,
     runs: NDArray[np.int64],
     status: Sequence[str],
     columns: Sequence[Column],
@@ -39,8 +38,6 @@ def render_explorer(
     Parameters
     ----------
     title : str
-    folder : str
-        Results folder, for the command that shows a run.
     runs : (n,) int array
         Number of each run.
     status : sequence of str
@@ -57,7 +54,6 @@ def render_explorer(
     shown = list(first)[:SHOWN]
     content = {
         "title": title,
-        "folder": folder,
         "address": address,
         "runs": pack_array(runs, "<u4"),
         "states": pack_array(codes, "<u1"),

@@ -3,22 +3,20 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import Workers
 from mcstudy.report import Section, Table
-from mcstudy.studyfile.identity import numbers_digest
 from mcstudy.studyfile.study_outputs import report_outputs
 from models.protocol import Model
 from studies.explorer import explore_runs
 from studies.kind import Finished, StudyKind
 from studies.monte_carlo.analysis import MonteCarloAnalysis, analyse, marks_of
-from studies.monte_carlo.design import sample_inputs
+from studies.monte_carlo.design import plan_design, run_design, runs_of_design
 from studies.monte_carlo.report import draw, sections_of, summarise
 from studies.monte_carlo.schema import MonteCarloStudy
-from studies.runs import ModelRuns, RunPlan, columns_of, load_study_model, run_rows
+from studies.runs import ModelRuns, RunPlan, load_study_model
 
 Done = Finished[MonteCarloStudy, ModelRuns, MonteCarloAnalysis]
 
@@ -34,9 +32,7 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns, MonteCarloAnalys
         model = load_study_model(study)
         report_outputs(study, model)
         marks_of(study, model)
-        columns = sample_inputs(study, model)
-        folder.check_same_study(numbers_digest(study, model))
-        return RunPlan(model, columns, np.arange(study.design.n) // study.design.size)
+        return plan_design(study, model, folder)
 
     def execute(
         self,
@@ -62,19 +58,12 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns, MonteCarloAnalys
         quiet : bool
             No progress line.
         """
-        design = study.design
-        runs = run_rows(
-            study, plan.model, plan.columns, folder,
-            design={"method": design.method, "n": design.n, "replicate_size": design.size},
-            replicate=plan.replicate, workers=workers, quiet=quiet,
-        )  # fmt: skip
+        runs = run_design(study, plan, folder, workers=workers, quiet=quiet)
         _keep_histories(study, plan.model, runs, folder)
 
     def results(self, study: MonteCarloStudy, folder: ResultsFolder) -> ModelRuns:
         """Return the model and the runs of the design."""
-        model = load_study_model(study)
-        runs = folder.runs(columns_of(model))
-        return ModelRuns(model, runs[runs["run"] < study.design.n])
+        return runs_of_design(study, folder)
 
     def analyse(self, study: MonteCarloStudy, results: ModelRuns) -> MonteCarloAnalysis:
         """Return every number that the report prints."""
@@ -92,11 +81,9 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns, MonteCarloAnalys
         """Return the figures by file name."""
         return draw(done.study, done.results.model, done.results.runs, done.analysis)
 
-    def pages(
-        self, study: MonteCarloStudy, results: ModelRuns, folder: ResultsFolder
-    ) -> Mapping[str, str]:
+    def pages(self, study: MonteCarloStudy, results: ModelRuns) -> Mapping[str, str]:
         """Return the explorer of the runs."""
-        return {"explorer.html": explore_runs(study, results.model, results.runs, folder.path)}
+        return {"explorer.html": explore_runs(study, results.model, results.runs)}
 
     def sections(self, done: Done, figures: Mapping[str, Any]) -> Sequence[Section]:
         """Return the sections of the report."""

@@ -1,12 +1,12 @@
 """The study file of a posterior, and the evidence file for an existing bank of runs."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat, model_validator
 
 from mcstudy.injury.functions import risk_function
 from mcstudy.studyfile.distributions import Distribution, Unit
-from mcstudy.studyfile.schema import Design, OutputReport, SampledStudy, StudyTable
+from mcstudy.studyfile.schema import Design, DesignedStudy, StudyTable
 
 Positive = Annotated[FiniteFloat, Field(gt=0.0)]
 NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
@@ -136,16 +136,8 @@ class EvidenceFile(EvidenceTables):
     title: str
 
 
-class PosteriorStudy(SampledStudy, EvidenceTables):
+class PosteriorStudy(DesignedStudy, EvidenceTables):
     """``kind = "posterior"``: what evidence says of the inputs of a crash."""
 
     kind: Literal["posterior"]
     design: Design = Design(method="sobol", n=4096, replicate_size=1024)
-    report: OutputReport = OutputReport()
-
-    def design_topics(self) -> dict[str, Any]:
-        """Return the parts of the design that affect the values of a run, by topic."""
-        return {
-            "design.method": self.design.method,
-            "design.replicate_size": self.design.size,
-        }

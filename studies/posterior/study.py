@@ -7,24 +7,21 @@ cost no run (``mcstudy infer``).
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import Workers
 from mcstudy.report import Section, Table
-from mcstudy.sampling import designs
-from mcstudy.studyfile.identity import numbers_digest
-from mcstudy.studyfile.study_inputs import map_inputs
 from mcstudy.studyfile.study_outputs import report_outputs
 from studies.explorer import explore_runs
 from studies.kind import Finished, StudyKind
+from studies.monte_carlo.design import plan_design, run_design, runs_of_design
 from studies.posterior.analysis import analyse
 from studies.posterior.evidence import check_tables
 from studies.posterior.numbers import PosteriorAnalysis
 from studies.posterior.report import draw, sections_of, summarise
 from studies.posterior.schema import PosteriorStudy
-from studies.runs import ModelRuns, RunPlan, columns_of, load_study_model, run_rows
+from studies.runs import ModelRuns, RunPlan, load_study_model
 
 Done = Finished[PosteriorStudy, ModelRuns, PosteriorAnalysis]
 
@@ -40,11 +37,7 @@ class PosteriorOf(StudyKind[PosteriorStudy, RunPlan, ModelRuns, PosteriorAnalysi
         model = load_study_model(study)
         report_outputs(study, model)
         check_tables(study, study, model)
-        design = study.design
-        uniforms = designs.draw(design.method, design.n, design.size, len(study.inputs), study.seed)
-        columns = map_inputs(study, model, uniforms)
-        folder.check_same_study(numbers_digest(study, model))
-        return RunPlan(model, columns, np.arange(design.n) // design.size)
+        return plan_design(study, model, folder)
 
     def execute(
         self,
@@ -70,18 +63,11 @@ class PosteriorOf(StudyKind[PosteriorStudy, RunPlan, ModelRuns, PosteriorAnalysi
         quiet : bool
             No progress line.
         """
-        design = study.design
-        run_rows(
-            study, plan.model, plan.columns, folder,
-            design={"method": design.method, "n": design.n, "replicate_size": design.size},
-            replicate=plan.replicate, workers=workers, quiet=quiet,
-        )  # fmt: skip
+        run_design(study, plan, folder, workers=workers, quiet=quiet)
 
     def results(self, study: PosteriorStudy, folder: ResultsFolder) -> ModelRuns:
         """Return the model and the runs of the design."""
-        model = load_study_model(study)
-        runs = folder.runs(columns_of(model))
-        return ModelRuns(model, runs[runs["run"] < study.design.n])
+        return runs_of_design(study, folder)
 
     def analyse(self, study: PosteriorStudy, results: ModelRuns) -> PosteriorAnalysis:
         """Return every number that the report prints."""
@@ -99,11 +85,9 @@ class PosteriorOf(StudyKind[PosteriorStudy, RunPlan, ModelRuns, PosteriorAnalysi
         """Return the figures by file name."""
         return draw(done.analysis)
 
-    def pages(
-        self, study: PosteriorStudy, results: ModelRuns, folder: ResultsFolder
-    ) -> Mapping[str, str]:
+    def pages(self, study: PosteriorStudy, results: ModelRuns) -> Mapping[str, str]:
         """Return the explorer of the runs."""
-        return {"explorer.html": explore_runs(study, results.model, results.runs, folder.path)}
+        return {"explorer.html": explore_runs(study, results.model, results.runs)}
 
     def sections(self, done: Done, figures: Mapping[str, Any]) -> Sequence[Section]:
         """Return the sections of the report."""

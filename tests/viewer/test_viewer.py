@@ -152,7 +152,7 @@ def explorer(*, address: str = "") -> str:
         Column("constant", "constant [–]", np.full(RUNS, 2.0)),
     ]
     return render_explorer(
-        "Runs </script><b>", "results/x", np.arange(RUNS), status.tolist(), columns,
+        "Runs </script><b>", np.arange(RUNS), status.tolist(), columns,
         ["hic15", "impact_speed"], address=address,
     )  # fmt: skip
 
@@ -180,5 +180,5 @@ def test_a_browser_chooses_the_runs_between_two_values_and_picks_one(tmp_path: P
     inside = int(((SPEED >= 10.0) & (SPEED <= 12.0)).sum())
     assert f'data-chosen="{inside}"' in body[0]
     assert 'data-picked="17"' in body[0]
-    assert "mcstudy view results/x --run 17" in dom
+    assert "mcstudy view FOLDER --run 17" in dom
     assert f"{inside:,} of {RUNS:,} runs" in dom

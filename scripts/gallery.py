@@ -20,6 +20,9 @@ def main() -> None:
     population = run_study("configs/population_injury.toml", quiet=False)
     methods = run_study("configs/model_comparison.toml", quiet=False)
     hood_map = run_study("configs/hood_map.toml", quiet=False)
+    three = run_study("configs/three_methods.toml", quiet=False)
+    chain = run_study("configs/method_chain.toml", quiet=False)
+    speed = run_study("configs/paper_posterior.toml", quiet=False)
     hood = ResultsFolder("results/stiffness_hood_tests")
     fit_stiffness_of(Path("configs/hood_tests"), hood)
     validation = ResultsFolder("results/validation_throw")
@@ -37,6 +40,9 @@ def main() -> None:
     shutil.copyfile(population.path / "figures" / "ais.png", GALLERY / "population_ais.png")
     shutil.copyfile(hood_map.path / "figures" / "map_hic15.png", GALLERY / "hood_map.png")
     shutil.copyfile(methods.path / "figures" / "variance.png", GALLERY / "method_variance.png")
+    shutil.copyfile(three.path / "figures" / "kinematics.png", GALLERY / "three_methods.png")
+    shutil.copyfile(chain.path / "figures" / "split_hic15.png", GALLERY / "method_chain.png")
+    shutil.copyfile(speed.path / "figures" / "posterior.png", GALLERY / "posterior_speed.png")
     shutil.copyfile(validation.path / "figures" / "throw_1.png", GALLERY / "validation_throw.png")
 
 

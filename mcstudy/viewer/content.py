@@ -86,7 +86,10 @@ def pack_array(values: NDArray[Any], kind: str = "<f4") -> str:
     kind : str
         Type of its numbers.
     """
-    return base64.b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")
+    # Numbers beyond single precision become infinite, which the pages leave out.
+    with np.errstate(over="ignore", invalid="ignore"):
+        table = np.ascontiguousarray(values, dtype=kind)
+    return base64.b64encode(table.tobytes()).decode("ascii")
 
 
 def _pack_mesh(mesh: MeshLike) -> dict[str, Any]:

@@ -1,12 +1,13 @@
 """Speeds by hand from a throw distance, as reconstruction offices compute them."""
 
-import math
 from dataclasses import dataclass
 
-from mcstudy.typed_json import Real
+import numpy as np
 
-GRAVITY = 9.81
-"""m/s2."""
+from mcstudy.typed_json import Real
+from studies.throw_formulae import happer_wrap, searle, toor_wrap
+from studies.throw_formulae import toor_forward as toor_forward_of
+
 FRICTIONS = (0.45, 0.66, 0.80)
 """Friction of a clothed body on a road: low, usual (Searle and Searle 1983) and high [recalled]."""
 KMH = 3.6
@@ -31,11 +32,12 @@ def hand_speeds(throw: float) -> list[HandSpeed]:
     throw : float
         From first contact to rest, m.
     """
-    least = [math.sqrt(2.0 * mu * GRAVITY * throw / (1.0 + mu**2)) for mu in FRICTIONS]
-    most = [math.sqrt(2.0 * mu * GRAVITY * throw) for mu in FRICTIONS]
-    toor = 9.84 * throw**0.57 / KMH
-    toor_forward = 8.25 * throw**0.61 / KMH
-    happer = (13.3 * math.sqrt(throw) - 4.6) / KMH
+    ends = [searle(np.array(throw), friction) for friction in FRICTIONS]
+    least, most = ([float(end[k]) for end in ends] for k in (0, 1))
+    length = np.array(throw)
+    toor, toor_forward, happer = (
+        float(relation(length)) / KMH for relation in (toor_wrap, toor_forward_of, happer_wrap)
+    )
     band = 7.0 / KMH
     return [
         HandSpeed(

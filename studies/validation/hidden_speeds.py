@@ -98,7 +98,7 @@ def validate(workers: int) -> Part:
     """Return the part on hidden speeds."""
     space = _space()
     with parallel_backend(workers):
-        bank = _crashes("multibody", space, designs.draw("sobol", RUNS, 1024, len(PRIORS), SEED))
+        bank = _crashes("multibody", space, designs.draw("sobol", RUNS, RUNS, len(PRIORS), SEED))
         rng = np.random.default_rng(SEED)
         uniforms = rng.random((HIDDEN, len(PRIORS)))
         first = list(PRIORS).index("impact_speed")

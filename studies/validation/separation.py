@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from mcstudy.execution.evaluator import Evaluator
 from mcstudy.execution.workers import parallel_backend
-from models.criteria.units import STANDARD_GRAVITY
 from models.protocol import OK, Model, complete_inputs
 from models.registry import load_model
 from models.vehicle.profile import load_vehicle
+from studies.throw_formulae import searle
 
 Array = NDArray[np.float64]
 
@@ -105,12 +105,6 @@ def _separation(model: Model, inputs: Mapping[str, float]) -> tuple[float, ...] 
 
 def _rate(time: Array) -> float:
     return 1.0 / float(time[1] - time[0])
-
-
-def searle(distance: Array, friction: Array | float) -> tuple[Array, Array]:
-    """Return Searle's lowest and highest speed (m/s) for a throw distance (m)."""
-    highest = np.sqrt(2.0 * friction * STANDARD_GRAVITY * distance)
-    return highest / np.sqrt(1.0 + np.square(friction)), highest
 
 
 def _searle_of(table: pd.DataFrame) -> tuple[Array, Array]:

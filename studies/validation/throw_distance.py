@@ -10,6 +10,7 @@ from mcstudy.figures import style
 from mcstudy.figures.panels import Band, Curve, Panel, draw_panels
 from mcstudy.text import number
 from models.criteria.units import STANDARD_GRAVITY
+from studies.throw_formulae import happer_wrap, toor_forward, toor_wrap, wood_simms
 from studies.validation.check import Part, check
 from studies.validation.separation import median_searle_ratio, separations, share_within_searle
 from studies.validation.sweep import sweep
@@ -21,26 +22,6 @@ SPEEDS = np.arange(20.0, 71.0, 10.0)
 """km/h."""
 FRICTIONS = (0.5, 0.6, 0.7)
 PHASES = (0.0, 0.17, 0.33, 0.5, 0.67, 0.83)
-
-
-def toor_wrap(distance: Array) -> Array:
-    """Return the speed (km/h) of Toor and Araszewski 2003 for wrap (recalled)."""
-    return 9.84 * np.asarray(distance) ** 0.57
-
-
-def toor_forward(distance: Array) -> Array:
-    """Return the speed (km/h) of Toor and Araszewski 2003 for forward projection (recalled)."""
-    return 8.25 * np.asarray(distance) ** 0.61
-
-
-def happer_wrap(distance: Array) -> Array:
-    """Return the speed (km/h) of Happer 2000 for wrap (recalled)."""
-    return 13.3 * np.sqrt(distance) - 4.6
-
-
-def wood_simms(distance: Array, factor: float = 3.6) -> Array:
-    """Return the speed (m/s) of Wood, Simms and Walsh 2004; bounds 2.5 and 4.5 (recalled)."""
-    return factor * np.sqrt(distance)
 
 
 def validate(workers: int) -> Part:

@@ -22,6 +22,7 @@ from studies.validation import (
     dummy_head,
     head_impact,
     headform_impacts,
+    hidden_speeds,
     numerics,
     separation,
     throw_distance,
@@ -152,6 +153,9 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Part]]
         patch.setattr(numerics, "INSIDE", 4)
         patch.setattr(numerics, "CORNERS", 2)
         patch.setattr(headform_impacts, "SPEEDS", np.linspace(4.0, 14.0, 3))
+        for name, few in (("RUNS", 256), ("HIDDEN", 12), ("COMPARED", 1), ("STEPS", 120),
+                          ("SKIPPED", 40)):  # fmt: skip
+            patch.setattr(hidden_speeds, name, few)
         nowhere = tmp_path_factory.mktemp("nowhere")
         found = run_parts(part_names(), measured=nowhere, workers=1, quiet=True)
         yield dict(zip(part_names(), found, strict=True))

@@ -255,3 +255,21 @@ def _t_interval(values: Array, centre: float) -> Estimate:
     error = float(values.std(ddof=1)) / np.sqrt(values.size)
     reach = float(stats.t.ppf(0.5 + CONFIDENCE / 2.0, values.size - 1)) * error
     return Estimate(centre, centre - reach, centre + reach)
+
+
+def crps(values: Array, weights: Array, true: float) -> float:
+    """Return the continuous ranked probability score of weighted draws (Gneiting, Raftery 2007).
+
+    Parameters
+    ----------
+    values, weights : (j,) arrays
+        Draws, and weights that sum to one.
+    true : float
+        What happened.
+    """
+    order = np.argsort(values)
+    x, w = values[order], weights[order]
+    summed = np.cumsum(w)
+    # Mean distance of two draws: 2 sum of F (1 - F) over the gaps.
+    apart = 2.0 * float(np.sum(summed[:-1] * (1.0 - summed[:-1]) * np.diff(x)))
+    return float(w @ np.abs(x - true)) - 0.5 * apart

@@ -1,18 +1,45 @@
 """Runs in the viewer: which curves of a crash it shows, and its page in a results folder."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from mcstudy.viewer import Curve, ViewedRun, render_viewer
 from models.protocol import Run
 
-HISTORIES = {
-    "head acceleration [g]": ("head", "acceleration"),
-    "head angular acceleration [rad/s²]": ("head", "angular_acceleration"),
-    "head velocity relative to the car [m/s]": ("head", "velocity_relative_to_car"),
+
+@dataclass(frozen=True)
+class View:
+    """A history to draw, if a run has it: channels of a group by legend label."""
+
+    group: str
+    channels: dict[str, str]
+    ylabel: str
+    caption: str
+
+
+VIEWS = {
+    "head_velocity": View(
+        "head",
+        {"resultant": "velocity_relative_to_car"},
+        "head velocity relative to the car [m/s]",
+        "Velocity of the head's centre of gravity relative to the car.",
+    ),
+    "head_acceleration": View(
+        "head",
+        {"resultant": "acceleration"},
+        "head acceleration [g]",
+        "Resultant acceleration of the head's centre of gravity, filtered.",
+    ),
+    "head_angular_acceleration": View(
+        "head",
+        {"resultant, CFC 180": "angular_acceleration"},
+        "head angular acceleration [rad/s²]",
+        "Resultant angular acceleration of the head.",
+    ),
 }
-"""Group and channel of each curve, by its label."""
+"""Histories of the head that are drawn, by the name of their figure."""
 EVENTS = {"head meets the car": "head_impact_time", "landing": "ground_time"}
 """Outputs that are times of events, by their label."""
 
@@ -46,10 +73,14 @@ def view_runs(title: str, runs: Mapping[str, Run]) -> str:
 def _curves(run: Run) -> list[Curve]:
     """Return histories of the head, and the contact force of each part that was touched."""
     found = []
-    for label, (group, channel) in HISTORIES.items():
-        history = run.histories.get(group)
-        if history is not None and channel in history.channels:
-            found.append(Curve(label, history.time, history.channels[channel]))
+    for view in VIEWS.values():
+        history = run.histories.get(view.group)
+        if history is not None:
+            found += [
+                Curve(view.ylabel, history.time, history.channels[channel])
+                for channel in view.channels.values()
+                if channel in history.channels
+            ]
     contact = run.histories.get("contact_force")
     if contact is not None:
         found += [

@@ -276,7 +276,7 @@ def residuals_at(
     forms: Sequence[Form],
     scores: Scores,
     scatter: Scatter,
-    wide: Sequence[Observation] | None = None,
+    wide: Sequence[Observation],
 ) -> tuple[Array, ...] | None:
     """Return the whitened residuals (n,) of every test; None if a run fails.
 
@@ -288,7 +288,7 @@ def residuals_at(
     scores : Scores
         Latents to simulate at.
     scatter : Scatter
-    wide : sequence of Observation, optional
+    wide : sequence of Observation
         Simulated tests whose factors on standard deviations apply.
     """
     seen = observe_tests(problem, forms, layouts, scores)
@@ -296,7 +296,7 @@ def residuals_at(
         return None
     return tuple(
         layout.residual(part, own, scatter, like.widening)
-        for layout, part, own, like in zip(layouts, seen, scores.own, wide or seen, strict=True)
+        for layout, part, own, like in zip(layouts, seen, scores.own, wide, strict=True)
     )
 
 

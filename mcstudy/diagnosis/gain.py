@@ -19,7 +19,7 @@ from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.diagnosis.screening import estimate_scatter
 from mcstudy.diagnosis.templates import smooth_discrepancy
-from mcstudy.statistics import Estimate
+from mcstudy.statistics import Estimate, crps
 
 Array = NDArray[np.float64]
 Quantity = Callable[[Array, Array], float]
@@ -340,11 +340,8 @@ def _log_density(off: Array, factor: Array) -> float:
 
 
 def _crps(draws: Array, target: float) -> float:
-    """Return the continuous ranked probability score of a sample (Gneiting, Raftery 2007)."""
-    ordered = np.sort(draws)
-    n = ordered.size
-    spread = float(np.sum((2.0 * np.arange(1, n + 1) - n - 1.0) * ordered)) / n**2
-    return float(np.mean(np.abs(ordered - target)) - spread)
+    """Return the continuous ranked probability score of a sample."""
+    return crps(draws, np.full(draws.size, 1.0 / draws.size), target)
 
 
 def _covers(draws: Array, target: float) -> float:

@@ -12,6 +12,7 @@ from scipy import stats
 
 from mcstudy.posterior.inference import Posterior
 from mcstudy.sampling import seeds
+from mcstudy.statistics import crps
 from mcstudy.typed_json import Real
 
 Array = NDArray[np.float64]
@@ -102,24 +103,6 @@ def leave_out(posterior: Posterior, *, count: int = LEFT_OUT, seed: int = 0) -> 
         rank = draws.share(draws.values < value) + 0.5 * draws.share(draws.values == value)
         found[:, k] = rank, middle, high - low, crps(draws.values, draws.weights, float(value))
     return LeftOut(rows[places], true, *found)
-
-
-def crps(values: Array, weights: Array, true: float) -> float:
-    """Return the continuous ranked probability score of weighted draws (Gneiting, Raftery 2007).
-
-    Parameters
-    ----------
-    values, weights : (j,) arrays
-        Draws, and weights that sum to one.
-    true : float
-        What happened.
-    """
-    order = np.argsort(values)
-    x, w = values[order], weights[order]
-    summed = np.cumsum(w)
-    # Mean distance of two draws: 2 sum of F (1 - F) over the gaps.
-    apart = 2.0 * float(np.sum(summed[:-1] * (1.0 - summed[:-1]) * np.diff(x)))
-    return float(w @ np.abs(x - true)) - 0.5 * apart
 
 
 def calibrate(left: LeftOut, label: str, inside: NDArray[np.bool_] | None = None) -> Calibration:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from mcstudy.sampling import seeds
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -122,14 +121,14 @@ def simulate_evidence(bank: Bank, items: Sequence[Item], *, seed: int, copies: i
     # Streams go by name, so that the order of the items changes nothing.
     for item in items:
         values = bank.values[item.name]
-        draws = _stream(seed, item.name).standard_normal(n * copies)
         known = np.isfinite(values)[rows]
-        with np.errstate(invalid="ignore"):
-            noisy = values[rows] + item.noise(values)[rows] * draws
         if item.happened is not None:
             kept &= known == item.happened
             continue
         kept &= known
+        draws = _stream(seed, item.name).standard_normal(n * copies)
+        with np.errstate(invalid="ignore"):
+            noisy = values[rows] + item.noise(values)[rows] * draws
         if item.is_bound:
             with np.errstate(invalid="ignore"):
                 kept &= (noisy >= item.low) & (noisy <= item.high)

@@ -64,8 +64,15 @@ class Draws:
     @property
     def effective(self) -> float:
         """Effective number of runs: the draws of one run count as one."""
-        unique, place = np.unique(self.runs, return_inverse=True)
-        return effective_size(np.bincount(place, self.weights, minlength=unique.size).astype(float))
+        return self.effective_among(np.ones(self.runs.size, dtype=bool))
+
+    def effective_among(self, inside: NDArray[np.bool_]) -> float:
+        """Return the effective number of runs among some of the draws, (j,)."""
+        if not inside.any():
+            return 0.0
+        unique, place = np.unique(self.runs[inside], return_inverse=True)
+        sums = np.bincount(place, self.weights[inside], minlength=unique.size)
+        return effective_size(sums.astype(float))
 
     def quantile(self, levels: Array | float) -> Array:
         """Return quantiles of the target."""

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from mcstudy.posterior.inference import Draws, Posterior
-from mcstudy.posterior.kernel import effective_size
 from mcstudy.statistics import CONFIDENCE, Estimate
 from mcstudy.typed_json import Real
 
@@ -102,7 +101,7 @@ def measure_ratio(posterior: Posterior, proposition: Proposition, draws: Draws) 
     share = draws.share(inside)
     n = draws.effective
     rare = inside if share <= 0.5 else ~inside
-    tail = _effective_runs(draws, rare)
+    tail = draws.effective_among(rare)
     tail_level = 0.5 - 0.5 * CONFIDENCE
     # Jeffreys' interval (L. Brown, T. Cai, A. DasGupta, 2001) of as many independent draws.
     beta = stats.beta(n * share + 0.5, n * (1.0 - share) + 0.5)
@@ -121,12 +120,3 @@ def measure_ratio(posterior: Posterior, proposition: Proposition, draws: Draws) 
 
 def _odds(p: float) -> float:
     return p / (1.0 - p) if p < 1.0 else np.inf
-
-
-def _effective_runs(draws: Draws, inside: NDArray[np.bool_]) -> float:
-    """Return the effective number of runs among some of the draws."""
-    if not inside.any():
-        return 0.0
-    unique, place = np.unique(draws.runs[inside], return_inverse=True)
-    sums = np.bincount(place, draws.weights[inside], minlength=unique.size).astype(float)
-    return effective_size(sums)

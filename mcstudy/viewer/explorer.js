@@ -1,14 +1,7 @@
 "use strict";
 (function () {
-  const content = JSON.parse(document.getElementById("content").textContent);
-  const byId = (name) => document.getElementById(name);
-  window.addEventListener("error", (event) => { document.body.dataset.error = event.message; });
+  const { bytes, byId, content } = window.mcstudy;
 
-  function bytes(text) {
-    const raw = atob(text), found = new Uint8Array(raw.length);
-    for (let k = 0; k < raw.length; k++) found[k] = raw.charCodeAt(k);
-    return found.buffer;
-  }
   const columns = content.columns;
   for (const column of columns) {
     column.values = new Float32Array(bytes(column.values));

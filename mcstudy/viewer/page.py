@@ -53,7 +53,9 @@ def render_page(
         title=title,
         style="\n".join(folder.joinpath(style).read_text("utf-8") for style in styles),
         library=library.replace("</script", "<\\/script"),
-        program=folder.joinpath(f"{name}.js").read_text("utf-8"),
+        program="\n".join(
+            folder.joinpath(script).read_text("utf-8") for script in ("content.js", f"{name}.js")
+        ),
         # Text of users must not end the script that holds it.
         content=json.dumps(content).replace("<", "\\u003c"),
     )

@@ -1,20 +1,13 @@
 "use strict";
 (function () {
-  const content = JSON.parse(document.getElementById("content").textContent);
-  const byId = (name) => document.getElementById(name);
+  const { bytes, byId, content } = window.mcstudy;
   const problem = (text) => { byId("problem").hidden = false; byId("problem").textContent = text; };
-  window.addEventListener("error", (event) => { document.body.dataset.error = event.message; });
 
   const PALETTE = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00"];
   const LEFT = 0xe69f00, RIGHT = 0x56b4e9, TRUNK = 0xb9c6cf, CAR = 0xdfe5e8;
   const APART = 2.8;
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
 
-  function bytes(text) {
-    const raw = atob(text), found = new Uint8Array(raw.length);
-    for (let k = 0; k < raw.length; k++) found[k] = raw.charCodeAt(k);
-    return found.buffer;
-  }
   const floats = (text) => new Float32Array(bytes(text));
 
   for (const run of content.runs) {

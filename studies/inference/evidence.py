@@ -10,14 +10,15 @@ from pydantic import TypeAdapter
 from mcstudy.errors import UserError
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.files import parse_toml, read_study_text
-from mcstudy.posterior.inference import Posterior
+from mcstudy.posterior.inference import SETS
 from mcstudy.sampling import seeds
 from mcstudy.studyfile.reading import check_study
 from mcstudy.studyfile.schema import SampledStudy
 from models.protocol import Model
 from studies.kinds import KINDS, load_study, parse_study
 from studies.posterior.analysis import analyse
-from studies.posterior.evidence import bank_of, check_tables, items_of, prior_weights, units_of
+from studies.posterior.case import Case
+from studies.posterior.evidence import check_tables, units_of
 from studies.posterior.numbers import PosteriorAnalysis
 from studies.posterior.report import draw, sections_of
 from studies.posterior.schema import EvidenceFile, EvidenceTables, PosteriorStudy
@@ -133,25 +134,18 @@ def posterior_draws(source: ResultsFolder, evidence: Path | str, *, n: int = DRA
     ------
     UserError
         If file and folder do not fit each other.
+    StudyError
+        If no run agrees with the evidence.
     """
     tables, _ = read_evidence(evidence)
     study, model, runs = load_bank(source)
     check_tables(tables, study, model)
-    bank = bank_of(runs, model)
-    try:
-        posterior = Posterior(
-            bank,
-            list(items_of(tables, model).values()),
-            tables.target,
-            weights=prior_weights(tables, study, bank, model),
-            seed=study.seed,
-        )
-    except ValueError as error:
-        raise UserError(f"evidence: {error}") from None
+    case = Case(tables, study, model, runs)
+    posterior = case.posterior(case.items, sets=SETS)
     draws = posterior.given()
     rng = seeds.generator(study.seed, seeds.EVIDENCE, 6)
     chosen = rng.choice(draws.values.size, n, p=draws.weights)
-    columns = {name: bank.values[name][draws.runs[chosen]] for name in units_of(model)}
+    columns = {name: case.bank.values[name][draws.runs[chosen]] for name in units_of(model)}
     return pd.DataFrame(columns | {tables.target: draws.values[chosen]})
 
 

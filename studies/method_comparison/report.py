@@ -13,7 +13,8 @@ from mcstudy.text import capital, quantity
 from models.protocol import Model, Run
 from studies.method_comparison.schema import MethodComparison
 from studies.published_tables import PublishedTable, as_table, compare_methods_with_table
-from studies.reconstruction.study import PRIMARY, VIEWS
+from studies.reconstruction.study import PRIMARY
+from studies.viewing import VIEWS
 
 MARGIN = 0.03
 """s of acceleration that is shown around the impacts of the head."""

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from mcstudy import units
-from mcstudy.errors import StudyError, UserError
 from mcstudy.injury.functions import risk_function
 from mcstudy.posterior.calibration import (
     BINS,
@@ -18,26 +17,25 @@ from mcstudy.posterior.calibration import (
     calibrate_thirds,
     leave_out,
 )
-from mcstudy.posterior.evidence import Bank, Item
-from mcstudy.posterior.inference import Draws, Posterior
+from mcstudy.posterior.evidence import Item
+from mcstudy.posterior.inference import SETS, Draws, Posterior
 from mcstudy.posterior.joint_coverage import measure_joint_coverage
-from mcstudy.posterior.kernel import LEAST, effective_size, weighted_quantile
+from mcstudy.posterior.kernel import effective_size
 from mcstudy.posterior.prior_check import PriorCheck, check_prior
-from mcstudy.posterior.ratio import Proposition, Ratio, measure_ratio
+from mcstudy.posterior.ratio import Proposition, Ratio
 from mcstudy.posterior.weights import tilt
 from mcstudy.sampling import seeds
 from mcstudy.studyfile.schema import SampledStudy
 from mcstudy.text import quantity
 from models.protocol import Model
 from studies.posterior.avoidability import measure_avoidability
+from studies.posterior.case import Case, spread_of
 from studies.posterior.evidence import (
-    bank_of,
     items_of,
-    prior_weights,
     propositions_of,
     units_of,
 )
-from studies.posterior.formulae import hand_speeds
+from studies.posterior.formulae import HandSpeed, hand_speeds
 from studies.posterior.numbers import (
     Assumption,
     Further,
@@ -54,86 +52,18 @@ from studies.runs import describe_runs
 
 Array = NDArray[np.float64]
 
-LEVELS = (0.5, 0.9, 0.95)
-"""Probabilities of the central intervals."""
 LEAST_RUNS = 100.0
 """Effective runs below which a posterior is refused."""
 FAILED = 0.001
 """p-value of the ranks below which the calibration has failed."""
 OFF = 0.05
 """Largest difference of the coverage of 90 % intervals."""
-FEWER = 32_768
-"""Simulated sets of evidence of the posteriors beside the main one."""
 FUTURES = 60
 """Draws of the posterior over which a further measurement is averaged."""
 JOINT = ("running_speed", "lateral_offset")
 """Inputs whose joint coverage with the target is measured, of those that are sampled."""
 GRID = 400
 """Points of the drawn densities."""
-
-
-class _Case:
-    """A bank, its evidence, and posteriors of any of its quantities."""
-
-    def __init__(
-        self, tables: EvidenceTables, study: SampledStudy, model: Model, runs: pd.DataFrame
-    ) -> None:
-        self.tables, self.model, self.study = tables, model, study
-        self.bank: Bank = bank_of(runs, model)
-        if self.bank.size < LEAST:
-            raise UserError(
-                f"only {self.bank.size} runs are complete, and a posterior takes {LEAST}; run the "
-                "study again to go on"
-            )
-        self.items = items_of(tables, model)
-        self.weights = prior_weights(tables, study, self.bank, model)
-        self.unit = study.inputs[tables.target].unit
-        self.factor = units.factor(units_of(model)[tables.target], self.unit)
-
-    def posterior(
-        self,
-        items: Mapping[str, Item],
-        target: str = "",
-        weights: Array | None = None,
-        sets: int = FEWER,
-    ) -> Posterior:
-        """Return the posterior of a quantity given items."""
-        return Posterior(
-            self.bank,
-            list(items.values()),
-            target or self.tables.target,
-            weights=self.weights if weights is None else weights,
-            seed=self.study.seed,
-            sets=sets,
-        )
-
-    def spread(self, draws: Draws, factor: float = 0.0) -> Spread:
-        """Return the distribution of draws of the target, in its unit."""
-        return spread_of(draws.values, draws.weights, draws.effective, factor or self.factor)
-
-
-def spread_of(values: Array, weights: Array, effective: float, factor: float = 1.0) -> Spread:
-    """Return the distribution of weighted values times a factor.
-
-    Parameters
-    ----------
-    values, weights : (j,) arrays
-        Draws, and weights that sum to one.
-    effective : float
-        Effective number of runs.
-    factor : float
-    """
-    ends = {
-        f"{level:g}": weighted_quantile(
-            values, weights, np.array([0.5 - 0.5 * level, 0.5 + 0.5 * level])
-        )
-        for level in LEVELS
-    }
-    return Spread(
-        factor * float(weighted_quantile(values, weights, 0.5)),
-        {key: (factor * float(low), factor * float(high)) for key, (low, high) in ends.items()},
-        effective,
-    )
 
 
 def _equal(values: Array, factor: float = 1.0) -> Spread:
@@ -163,12 +93,9 @@ def analyse(
     StudyError
         If no run agrees with the evidence.
     """
-    case = _Case(tables, study, model, runs)
+    case = Case(tables, study, model, runs)
     ended, _ = describe_runs(study, model, runs)
-    try:
-        main = case.posterior(case.items, sets=262_144)
-    except ValueError as error:
-        raise StudyError(f"evidence: {error}") from None
+    main = case.posterior(case.items, sets=SETS)
     draws = main.given()
     check = check_prior(main.simulated, main.prior)
     left = leave_out(main, seed=study.seed)
@@ -177,7 +104,8 @@ def analyse(
     joint = measure_joint_coverage(main, together, seed=study.seed)
     refused = _refusal(check, calibration, draws)
     propositions = propositions_of(tables, model)
-    plain = case.posterior(items_of(tables, model, discrepancy=0.0))
+    plain = case.posterior(case.plain)
+    bare = plain.given()
     assumptions = _assumptions(case, propositions)
     before = main.bank.values[tables.target]
     return PosteriorAnalysis(
@@ -189,8 +117,8 @@ def analyse(
             before, case.weights / case.weights.sum(), effective_size(case.weights), case.factor
         ),
         after=case.spread(draws),
-        plain=case.spread(plain.given()),
-        curves=_curves(case, draws, plain.given()),
+        plain=case.spread(bare),
+        curves=_curves(case, draws, bare),
         ranks=np.histogram(left.ranks, BINS, (0.0, 1.0))[0].tolist(),
         check=check,
         refused=refused,
@@ -216,7 +144,7 @@ def analyse(
     )
 
 
-def _curves(case: _Case, draws: Draws, plain: Draws) -> dict[str, list[float]]:
+def _curves(case: Case, draws: Draws, plain: Draws) -> dict[str, list[float]]:
     """Return the densities of prior and posteriors on a grid of the target, in its unit."""
     values = case.factor * case.bank.values[case.tables.target]
     grid = np.linspace(values.min(), values.max(), GRID)
@@ -266,7 +194,7 @@ def _in_unit(entry: Calibration, factor: float) -> Calibration:
     )
 
 
-def _item_results(case: _Case, check: PriorCheck) -> list[ItemResult]:
+def _item_results(case: Case, check: PriorCheck) -> list[ItemResult]:
     """Return each item: by itself, left out, and predicted by the others."""
     found = []
     for name, item in case.items.items():
@@ -292,17 +220,16 @@ def _item_results(case: _Case, check: PriorCheck) -> list[ItemResult]:
     return found
 
 
-def _predicted(case: _Case, item: Item, others: Mapping[str, Item]) -> float:
+def _predicted(case: Case, item: Item, others: Mapping[str, Item]) -> float:
     """Return the two-sided p-value of an item given the others."""
-    there = {**others, "": Item(item.name, happened=True)}
-    draws = case.posterior(there, item.name).given()
+    draws = case.draws_of(item.name, others)
     rng = seeds.generator(case.study.seed, seeds.EVIDENCE, 4)
     noisy = draws.values + item.noise(draws.values) * rng.standard_normal(draws.values.size)
     below = draws.share(noisy <= float(item.value or 0.0))
     return float(min(1.0, 2.0 * min(below, 1.0 - below)))
 
 
-def _said(case: _Case, name: str) -> str:
+def _said(case: Case, name: str) -> str:
     """Return an item in words."""
     entry = case.tables.evidence[name]
     if entry.happened is not None:
@@ -323,7 +250,7 @@ def _said(case: _Case, name: str) -> str:
     return ", ".join(end for end in ends if end)
 
 
-def _assumptions(case: _Case, propositions: Sequence[Proposition]) -> list[Assumption]:
+def _assumptions(case: Case, propositions: Sequence[Proposition]) -> list[Assumption]:
     """Return target and ratios under other assumptions, one changed at a time."""
     target = case.tables.target
     varied: list[tuple[str, Mapping[str, Item], Array]] = []
@@ -346,13 +273,13 @@ def _assumptions(case: _Case, propositions: Sequence[Proposition]) -> list[Assum
             if proposition.name != target:
                 own = case.posterior(items, proposition.name, weights)
                 its = own.given()
-            ratios[proposition.label] = measure_ratio(own, proposition, its)
+            ratios[proposition.label] = case.ratio(own, proposition, its)
         found.append(Assumption(label, case.spread(draws), ratios))
     return found
 
 
 def _ratio_result(
-    case: _Case,
+    case: Case,
     proposition: Proposition,
     main: Posterior,
     draws: Draws,
@@ -360,36 +287,31 @@ def _ratio_result(
     assumptions: Sequence[Assumption],
 ) -> RatioResult:
     if proposition.name != case.tables.target:
-        main = case.posterior(case.items, proposition.name, sets=262_144)
+        main = case.posterior(case.items, proposition.name, sets=SETS)
         draws = main.given()
-        without = items_of(case.tables, case.model, discrepancy=0.0)
-        plain = case.posterior(without, proposition.name)
-    try:
-        given = measure_ratio(main, proposition, draws)
-        bare = measure_ratio(plain, proposition, plain.given())
-    except ValueError as error:
-        raise StudyError(f"propositions.{error}") from None
+        plain = case.posterior(case.plain, proposition.name)
+    given = case.ratio(main, proposition, draws)
+    without = case.ratio(plain, proposition, plain.given())
     others: list[Ratio] = [given, *(entry.ratios[proposition.label] for entry in assumptions)]
     values = [ratio.ratio.value if ratio.resolved else np.nan for ratio in others]
     return RatioResult(
-        proposition.label, given, bare, in_words(given), float(min(values)), float(max(values))
+        proposition.label, given, without, in_words(given), float(min(values)), float(max(values))
     )
 
 
-def _formulae(case: _Case) -> list:  # type: ignore[type-arg]
+def _formulae(case: Case) -> list[HandSpeed]:
     item = case.items.get("throw_distance")
     if item is None or item.value is None or case.tables.target != "impact_speed":
         return []
     return hand_speeds(item.value)
 
 
-def _injury(case: _Case) -> InjuryResult | None:
+def _injury(case: Case) -> InjuryResult | None:
     """Return HIC15 and the probabilities of each AIS or worse, given the evidence."""
     entry = case.tables.injury
     if entry is None:
         return None
-    items = {**case.items, "": Item("hic15", happened=True)}
-    draws = case.posterior(items, "hic15").given()
+    draws = case.draws_of("hic15", case.items)
     exceeding = {}
     for name in entry.functions:
         function = risk_function(name)
@@ -400,7 +322,7 @@ def _injury(case: _Case) -> InjuryResult | None:
     return InjuryResult(case.spread(draws, 1.0), exceeding, entry.recorded)
 
 
-def _others(case: _Case) -> list[OtherQuantity]:
+def _others(case: Case) -> list[OtherQuantity]:
     """Return the other quantities that the evidence file asks for, before and after."""
     found = []
     for name in case.tables.also:
@@ -413,13 +335,12 @@ def _others(case: _Case) -> list[OtherQuantity]:
         known = np.isfinite(values)
         weights = case.weights[known] / case.weights[known].sum()
         before = spread_of(values[known], weights, effective_size(weights), factor)
-        items = {**case.items, "": Item(name, happened=True)}
-        after = case.spread(case.posterior(items, name).given(), factor)
+        after = case.spread(case.draws_of(name, case.items), factor)
         found.append(OtherQuantity(name, unit, before, after))
     return found
 
 
-def _further(case: _Case, draws: Draws) -> list[Further]:
+def _further(case: Case, draws: Draws) -> list[Further]:
     """Return the expected width of the 90 % interval after each further measurement."""
     found = []
     rng = seeds.generator(case.study.seed, seeds.EVIDENCE, 5)

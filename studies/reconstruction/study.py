@@ -1,7 +1,6 @@
 """The reconstruction: one run, compared with published tables and drawn."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,44 +22,12 @@ from studies.published_tables import PublishedTable, as_table, compare_with_tabl
 from studies.reconstruction.schema import Reconstruction
 from studies.reconstruction.variants import VariantOutcome, variant_ranges, variant_table
 from studies.runs import load_study_model
-from studies.viewing import view_runs
+from studies.viewing import VIEWS, view_runs
 
 LONG = 5.0
 """CPU time (s) of a run from which on its progress is shown."""
 PRIMARY = 0.12
 """s after first contact that the histories show: the impact on the car."""
-
-
-@dataclass(frozen=True)
-class View:
-    """A history to draw, if a run has it: channels of a group by legend label."""
-
-    group: str
-    channels: dict[str, str]
-    ylabel: str
-    caption: str
-
-
-VIEWS = {
-    "head_velocity": View(
-        "head",
-        {"resultant": "velocity_relative_to_car"},
-        "head velocity relative to the car [m/s]",
-        "Velocity of the head's centre of gravity relative to the car.",
-    ),
-    "head_acceleration": View(
-        "head",
-        {"resultant": "acceleration"},
-        "head acceleration [g]",
-        "Resultant acceleration of the head's centre of gravity, filtered.",
-    ),
-    "head_angular_acceleration": View(
-        "head",
-        {"resultant, CFC 180": "angular_acceleration"},
-        "head angular acceleration [rad/s²]",
-        "Resultant angular acceleration of the head.",
-    ),
-}
 
 
 def reconstruct(study: Reconstruction, *, quiet: bool = True) -> tuple[Run, list[PublishedTable]]:

@@ -17,11 +17,11 @@ from scipy import special
 from mcstudy.execution.workers import parallel_backend
 from mcstudy.figures import style
 from mcstudy.figures.panels import Curve, Panel, draw_panels
-from mcstudy.posterior.calibration import crps
 from mcstudy.posterior.evidence import Bank, Item
 from mcstudy.posterior.inference import Posterior
 from mcstudy.posterior.kernel import weighted_quantile
 from mcstudy.sampling import designs
+from mcstudy.statistics import crps
 from mcstudy.studyfile.distributions import Normal, Triangular, Uniform
 from mcstudy.studyfile.input_space import InputSpace
 from mcstudy.text import number

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from mcstudy.posterior.calibration import calibrate, calibrate_thirds, crps, leave_out
+from mcstudy.posterior.calibration import calibrate, calibrate_thirds, leave_out
 from mcstudy.posterior.contours import find_families
 from mcstudy.posterior.evidence import Bank, Item, simulate_evidence
 from mcstudy.posterior.inference import Posterior
@@ -15,6 +15,7 @@ from mcstudy.posterior.kernel import weighted_quantile
 from mcstudy.posterior.prior_check import check_prior
 from mcstudy.posterior.ratio import Proposition, measure_ratio
 from mcstudy.posterior.weights import density_of, reweight, tilt
+from mcstudy.statistics import crps
 
 MEAN, SD = 50.0, 10.0
 
@@ -116,8 +117,8 @@ def test_crps_of_weighted_draws_against_its_definition() -> None:
     assert crps(values, weights, 0.3) == pytest.approx(by_hand, abs=1e-3)
 
 
-def spread_of(items: list[Item], **more: object) -> tuple[float, float]:
-    draws = Posterior(bank_of(1024), items, "speed", **more).given()  # type: ignore[arg-type]
+def spread_of(items: list[Item]) -> tuple[float, float]:
+    draws = Posterior(bank_of(1024), items, "speed").given()
     low, median, high = draws.quantile(np.array([0.05, 0.5, 0.95]))
     return float(median), float(high - low)
 

@@ -157,7 +157,7 @@ def test_draws_for_python(bank: ResultsFolder, tmp_path: Path,
             "--draws", csv, "--quiet")  # fmt: skip
     assert csv.read_text().count("\n") == 4001
     fake = types.ModuleType("arviz")
-    fake.from_dict = lambda table: table  # type: ignore[attr-defined]
+    fake.__dict__["from_dict"] = lambda table: table
     monkeypatch.setitem(sys.modules, "arviz", fake)
     assert to_inference_data(draws)["impact_speed"].shape == (1, 2000)
     monkeypatch.setitem(sys.modules, "arviz", None)
@@ -175,6 +175,7 @@ def test_draws_for_python(bank: ResultsFolder, tmp_path: Path,
         (('unit = "N"', 'unit = "kg"'), "evidence.peak_force.unit"),
         (("above = 30.0", ""), "give above, below or both"),
         (('of = "impact_speed"', 'of = "speed"'), "propositions.above 30 km/h.of: model"),
+        (("above = 30.0", "above = 3000.0"), "propositions.above 30 km/h: false in every run"),
         (("title", 'target = "friction_body_car"\ntitle'), "is not sampled by the study"),
         (("title", 'also = ["colour"]\ntitle'), "has no input or output 'colour'"),
         (("mcstudy-evidence/1", "mcstudy-evidence/2"), "format"),

@@ -131,7 +131,7 @@ def _split_table(name: str, split: SplitOutput, analysis: ChainAnalysis) -> Tabl
 
 
 def _relative(value: float, base: float) -> str:
-    return f"{100.0 * value / abs(base):+.1f} %" if base else "–"
+    return f"{100.0 * value / abs(base):.1f} %" if base else "–"
 
 
 def _steps_table(split: SplitOutput) -> Table:

@@ -63,7 +63,10 @@ def sections_of(analysis: FidelityAnalysis, figures: Mapping[str, Any]) -> list[
         sections.append(
             Section(
                 words,
-                [],
+                [
+                    "The last column compares the width of the interval with that of the same "
+                    f"budget spent on {dear} alone, measured on its own runs."
+                ],
                 [_output_table(name, output, dear)],
                 {
                     f"Probability of exceeding a level: {dear} by all models with its interval, "
@@ -146,9 +149,7 @@ def _output_table(name: str, output: FidelityOutput, dear: str) -> Table:
         )  # fmt: skip
     title = capital(style.words(name))
     return Table(
-        f"{title} [{unit(output.unit) or '–'}] of {dear}, with 95 % intervals; the last column "
-        "compares the width with that of the same budget spent on this model alone, measured on "
-        "its own runs.",
+        f"{title} [{unit(output.unit) or '–'}] of {dear}, with 95 % intervals.",
         ["statistic", "by all models", f"{dear} alone", "width"],
         rows,
     )

@@ -175,6 +175,22 @@ class Mesh:
 
 
 @dataclass(frozen=True)
+class ContactForces:
+    """Contact forces in a scene, drawn as arrows.
+
+    Attributes
+    ----------
+    place : (f, m, 3) array
+        Points of application, world axes, m; NaN where there is no force.
+    force : (f, m, 3) array
+        World axes, N.
+    """
+
+    place: Array
+    force: Array
+
+
+@dataclass(frozen=True)
 class Scene:
     """Data for a picture or an animation of a run.
 
@@ -198,6 +214,11 @@ class Scene:
         x, y (m), outline of the car from above in its frame.
     meshes : sequence of Mesh
         Surfaces of facets.
+    forces : ContactForces or None
+        Of car and road on the body.
+    tape : (k, 3) array or None
+        Corners of the tape that measures the wrap-around distance of the head's first contact,
+        from the road on, in the car's frame, m.
     """
 
     time: Array
@@ -209,6 +230,8 @@ class Scene:
     outline: Sequence[Array]
     plan: Array
     meshes: Sequence[Mesh] = ()
+    forces: ContactForces | None = None
+    tape: Array | None = None
 
 
 @dataclass(frozen=True)

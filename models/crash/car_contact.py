@@ -106,12 +106,14 @@ def apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, po
         # The loads before the zones are subtracted here, those after them are added below.
         for k in range(3):
             contacts.car_force[i, k] = -loads.force[i, k]
+            contacts.car_torque[i, k] = -loads.torque[i, k]
         if cx > reach or ellipsoids.surface_law[i, 0] < 0:
             # Ahead of the foremost point, x = 0, or free of the car.
             for j in range(count):
                 contacts.engaged[i, j] = False
             for k in range(3):
                 contacts.car_force[i, k] = 0.0
+                contacts.car_torque[i, k] = 0.0
             continue
         survey(front, ellipsoids, motion, i, cx, cy, cz, cosine, sine)
         for j in range(count):
@@ -184,6 +186,7 @@ def apply_car_contacts(front, ellipsoids, car, motion, loads, contacts, tree, po
         carry(front, car, cosine, sine, motion, loads, contacts, power, i)
         for k in range(3):
             contacts.car_force[i, k] += loads.force[i, k]
+            contacts.car_torque[i, k] += loads.torque[i, k]
 
 
 @inlined_kernel

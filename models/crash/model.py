@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from models.crash import outcome
 from models.crash.memory import CrashMemory
-from models.crash.record import END_REASONS, Column, Frame, Summary
+from models.crash.record import END_REASONS, SEGMENT_ENTRIES, Column, Frame, Summary
 from models.crash.scenario import HOOD, Scenario
+from models.crash.scene import build_scene
 from models.crash.tape import Tape, tape_on_zones
 from models.declaration import run_rows
 from models.effects.chain import build_chain
@@ -99,7 +100,9 @@ class CrashModel(ABC):
         self._memory = CrashMemory(self._chain)
         n, zones = len(SEGMENTS), len(self.vehicle.zones)
         self._record = np.zeros((int(TIME_LIMIT / self.tick) + 2, Column.REGION_FORCE + zones + 1))
-        self._frames = np.zeros((int(TIME_LIMIT / FRAME_INTERVAL) + 2, Frame.POSES + 7 * n))
+        self._frames = np.zeros(
+            (int(TIME_LIMIT / FRAME_INTERVAL) + 2, Frame.POSES + SEGMENT_ENTRIES * n)
+        )
 
     @property
     def inputs(self) -> tuple[Input, ...]:
@@ -212,7 +215,7 @@ class CrashModel(ABC):
             reason,
             measured,
             histories,
-            outcome.scene(raw, self._meshes(raw)) if scene else None,
+            build_scene(raw, self._tape, self._meshes(raw)) if scene else None,
         )
 
     def _row(self, values: dict[str, float]) -> tuple[str, dict[str, float]]:

@@ -1,15 +1,15 @@
-"""Outputs, histories and scene of a finished run."""
+"""Outputs and histories of a finished run."""
 
 import functools
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models.contact.law import SURFACE, interpolate_law
-from models.crash.record import Column, Frame, HeadContact, Summary
+from models.crash.record import Column, HeadContact, Summary
 from models.crash.scenario import Scenario
 from models.crash.surfaces import WORK_CHANNELS
 from models.crash.tape import Measured, Tape, tape_on_zones
@@ -25,10 +25,9 @@ from models.criteria.sampling import resultant, sample_record
 from models.criteria.units import STANDARD_GRAVITY
 from models.effects.chain import EffectChain
 from models.effects.reading import Reading, record_reading
-from models.pedestrian.anthropometry import HEAD, SEGMENTS
-from models.protocol import History, Mesh, Scene, chosen_histories, history_of
+from models.pedestrian.anthropometry import HEAD
+from models.protocol import History, chosen_histories, history_of
 from models.vehicle.motion import stopping_distance
-from models.vehicle.zones import ROLL
 
 Array = NDArray[np.float64]
 
@@ -331,47 +330,3 @@ def histories(
         work = {name: (np.array([raw.work[k]]), "J") for k, name in enumerate(WORK_CHANNELS)}
         found["work"] = history_of(np.array([raw.summary[Summary.TIME]]), work)
     return found
-
-
-def scene(raw: Raw, meshes: Sequence[Mesh] = ()) -> Scene:
-    """Return the poses of the segments, the car's outlines and surfaces of facets.
-
-    Parameters
-    ----------
-    raw : Raw
-    meshes : sequence of Mesh
-        Surfaces of rigid bodies, in their own frames.
-    """
-    frames, n = raw.frames, len(SEGMENTS)
-    pose = frames[:, Frame.POSES :].reshape(-1, n, 7)
-    zones = raw.scenario.zones
-    outline = []
-    for j in range(zones.radius.size):
-        if zones.kind[j] == ROLL:
-            angle = np.linspace(0.0, 2.0 * math.pi, 61)
-            ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-            outline.append(zones.origin[j] + zones.radius[j] * ring)
-        else:
-            outline.append(
-                np.array([zones.origin[j], zones.origin[j] + zones.length[j] * zones.direction[j]])
-            )
-    width = zones.half_width.max()
-    y = np.linspace(-width, width, 41)
-    bumper = raw.scenario.vehicle.zone_index("bumper")
-    nose = -0.5 * zones.curvature[bumper] * y**2
-    rear = np.full(2, zones.box[:, 0].min())
-    plan = np.stack(
-        [np.concatenate([nose, rear, nose[:1]]), np.concatenate([y, [width, -width], y[:1]])],
-        axis=1,
-    )
-    return Scene(
-        time=frames[:, Frame.TIME].copy(),
-        names=SEGMENTS,
-        semi_axes=np.sqrt(raw.scenario.ellipsoids.square),
-        centre=pose[:, :, :3].copy(),
-        orientation=pose[:, :, 3:].copy(),
-        car=frames[:, Frame.CAR : Frame.POSES].copy(),
-        outline=outline,
-        plan=plan,
-        meshes=meshes,
-    )

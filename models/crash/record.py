@@ -85,7 +85,22 @@ class Frame(IntEnum):
     CAR = 1
     """(3) x, y, yaw of the car's frame, m and rad."""
     POSES = 4
-    """(7 n) centre (m) and quaternion of each ellipsoid."""
+    """(SEGMENT_ENTRIES n) entries ``SegmentFrame`` of each segment."""
+
+
+class SegmentFrame(IntEnum):
+    """First entries of a segment in a frame."""
+
+    CENTRE = 0
+    """(3) of the ellipsoid, m."""
+    ORIENTATION = 3
+    """(4) quaternion."""
+    CAR_FORCE = 7
+    """(3) of the car on the segment, world axes, N."""
+    CAR_TORQUE = 10
+    """(3) of that force about the ellipsoid's centre, world axes, N m."""
+    ROAD_FORCE = 13
+    """(1) normal force of the road, N."""
 
 
 class Blow(IntEnum):
@@ -98,6 +113,8 @@ class Blow(IntEnum):
     PEAK = 5
 
 
+SEGMENT_ENTRIES = SegmentFrame.ROAD_FORCE + 1
+"""Number of entries of ``SegmentFrame``."""
 HEAD_CONTACT_ENTRIES = HeadContact.POINT + 3
 """Number of entries of ``HeadContact``."""
 BLOW_ENTRIES = Blow.PEAK + 1

@@ -9,11 +9,13 @@ from models.crash.record import (
     REST_SPEED,
     REST_SPREAD,
     REST_TIME,
+    SEGMENT_ENTRIES,
     Blow,
     Column,
     EndReason,
     Frame,
     HeadContact,
+    SegmentFrame,
     Summary,
 )
 
@@ -193,8 +195,8 @@ def write_centre(row, mass, motion, record):
 
 
 @inlined_kernel
-def write_frame(row, time, orientation, contacts, car, frames):
-    """Write a frame: time, the car's position and yaw, ellipsoid centres and quaternions.
+def write_frame(row, time, orientation, motion, contacts, car, frames):
+    """Write a frame: time, the car's position and yaw, poses of the ellipsoids and loads on them.
 
     Parameters
     ----------
@@ -204,22 +206,35 @@ def write_frame(row, time, orientation, contacts, car, frames):
         s.
     orientation : (n, 4) array
         Quaternions of the segments.
+    motion : Motion
+        Positions and velocities of the segments.
     contacts : Contacts
         State and results of the contacts.
     car : (6,) array
         x, y (m) and yaw (rad) of the car's frame and their rates.
-    frames : (rows, 4 + 7 n) array
+    frames : (rows, 4 + SEGMENT_ENTRIES n) array
         Row ``row`` is filled.
     """
     frames[row, Frame.TIME] = time
     for k in range(3):
         frames[row, Frame.CAR + k] = car[k]
+    road = contacts.zone_force.shape[0] - 1
     for i in range(orientation.shape[0]):
-        first = Frame.POSES + 7 * i
+        first = Frame.POSES + SEGMENT_ENTRIES * i
         for k in range(3):
-            frames[row, first + k] = contacts.centre[i, k]
+            frames[row, first + SegmentFrame.CENTRE + k] = contacts.centre[i, k]
         for k in range(4):
-            frames[row, first + 3 + k] = orientation[i, k]
+            frames[row, first + SegmentFrame.ORIENTATION + k] = orientation[i, k]
+        fx, fy, fz = contacts.car_force[i, 0], contacts.car_force[i, 1], contacts.car_force[i, 2]
+        rx = motion.centre[i, 0] - contacts.centre[i, 0]
+        ry = motion.centre[i, 1] - contacts.centre[i, 1]
+        rz = motion.centre[i, 2] - contacts.centre[i, 2]
+        force, torque = first + SegmentFrame.CAR_FORCE, first + SegmentFrame.CAR_TORQUE
+        frames[row, force], frames[row, force + 1], frames[row, force + 2] = fx, fy, fz
+        frames[row, torque] = contacts.car_torque[i, 0] + ry * fz - rz * fy
+        frames[row, torque + 1] = contacts.car_torque[i, 1] + rz * fx - rx * fz
+        frames[row, torque + 2] = contacts.car_torque[i, 2] + rx * fy - ry * fx
+        frames[row, first + SegmentFrame.ROAD_FORCE] = contacts.segment_force[i, road]
 
 
 @inlined_kernel

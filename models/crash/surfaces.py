@@ -57,6 +57,8 @@ class Contacts(NamedTuple):
         Current normal force, N.
     car_force : (n, 3) array
         Current total force of the car on a segment, world axes, N.
+    car_torque : (n, 3) array
+        Current total torque of the car on a segment about its centre of mass, world axes, N m.
     point : (n, z, 3) array
         Current deepest point in the car's frame, m.
     normal : (n, z, 3) array
@@ -75,6 +77,7 @@ class Contacts(NamedTuple):
     zone_force: Array
     segment_force: Array
     car_force: Array
+    car_torque: Array
     point: Array
     normal: Array
     centre: Array
@@ -98,6 +101,7 @@ def empty_contacts(n: int, z: int, p: int) -> Contacts:
         zone_force=np.zeros(z + 1),
         segment_force=np.zeros((n, z + 1)),
         car_force=np.zeros((n, 3)),
+        car_torque=np.zeros((n, 3)),
         point=np.zeros((n, z, 3)),
         normal=np.zeros((n, z, 3)),
         centre=np.zeros((n, 3)),

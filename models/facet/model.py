@@ -12,7 +12,7 @@ from models.crash.facet_survey import empty_findings
 from models.crash.model import TICK
 from models.crash.outcome import ANGULAR_CLASS, LINEAR_CLASS, Raw
 from models.crash.scenario import Scenario
-from models.crash.tape import Tape
+from models.crash.tape import Tape, path_at
 from models.effects.registry import effects_of
 from models.multibody.model import MultibodyModel
 from models.pedestrian.anthropometry import HEAD, SEGMENTS, TRUNK, Body
@@ -33,7 +33,7 @@ from models.vehicle.surface.field import DistanceField, distances
 from models.vehicle.surface.generator import laws_of_regions
 from models.vehicle.surface.mesh import SurfaceMesh
 from models.vehicle.surface.store import load_field
-from models.vehicle.surface.wrap import leading_edge_distance, section, wrap_distance
+from models.vehicle.surface.wrap import leading_edge_distance, section, wrap_distance, wrap_path
 
 Array = NDArray[np.float64]
 
@@ -150,8 +150,13 @@ class FacetModel(MultibodyModel):
         surface = place[0] - depth[0] * gradient[0] / np.linalg.norm(gradient[0])
         lines = section(self.mesh, float(surface[1]))
         if not len(lines):
-            return Tape(math.nan, math.nan)
-        return Tape(wrap_distance(lines, surface[[0, 2]]), leading_edge_distance(lines))
+            return Tape(math.nan, math.nan, np.empty((0, 3)))
+        end = surface[[0, 2]]
+        return Tape(
+            wrap_distance(lines, end),
+            leading_edge_distance(lines),
+            path_at(wrap_path(lines, end), float(surface[1])),
+        )
 
     def _meshes(self, raw: Raw) -> list[Mesh]:
         """Return the diving car and, if it has facets, the child."""

@@ -127,7 +127,7 @@ class CoreData(NamedTuple):
         Work on the body by channel, J.
     record : (rows, columns) array
         See ``models.crash.record.Column``.
-    frames : (rows, 4 + 7 n) array
+    frames : (rows, 4 + SEGMENT_ENTRIES n) array
         See ``models.crash.record.Frame``.
     head_contact : (entries,) array
         See ``models.crash.record.HeadContact``.
@@ -352,7 +352,9 @@ def simulate(model, data):
             _write_record(rows, time, model, data)
             rows += 1
         if ticks >= shots * settings.frame_every and shots < data.frames.shape[0]:
-            write_frame(shots, time, motion.orientation, contacts, data.car, data.frames)
+            write_frame(
+                shots, time, motion.orientation, motion, contacts, data.car, data.frames
+            )  # fmt: skip
             shots += 1
         reason = limit_reason(time, steps, settings)
         if reason != GOES_ON:

@@ -4,7 +4,7 @@ import math
 from enum import IntEnum
 
 from models.compilation import inlined_kernel
-from models.crash.record import Column, Frame, HeadContact, Summary
+from models.crash.record import SEGMENT_ENTRIES, Column, Frame, HeadContact, Summary
 from models.crash.recorder import write_centre, write_contact_forces, write_frame
 from models.planar.space import ANGLE, SPEED_X, SPEED_Z, SPIN
 
@@ -66,7 +66,7 @@ def write_row(row, time, model, data):
 
 
 @inlined_kernel
-def write_poses(row, time, body, state, orientation, contacts, car, frames):
+def write_poses(row, time, body, state, orientation, motion, contacts, car, frames):
     """Write the poses of all segments, with their initial quaternions rotated about y.
 
     Parameters
@@ -80,11 +80,13 @@ def write_poses(row, time, body, state, orientation, contacts, car, frames):
         x, z (m), angle (rad) and their rates of all bodies.
     orientation : (n, 4) array
         Filled with the quaternions.
+    motion : PlanarMotion
+        Positions and velocities of the segments.
     contacts : Contacts
         State and results of the contacts.
     car : (6,) array
         x, y (m) and yaw (rad) of the car's frame and their rates.
-    frames : (rows, 4 + 7 n) array
+    frames : (rows, 4 + SEGMENT_ENTRIES n) array
         Row ``row`` is filled.
     """
     for i in range(body.mass.shape[0]):
@@ -100,9 +102,9 @@ def write_poses(row, time, body, state, orientation, contacts, car, frames):
         orientation[i, 1] = c * x + s * z
         orientation[i, 2] = c * y + s * w
         orientation[i, 3] = c * z - s * x
-    write_frame(row, time, orientation, contacts, car, frames)
+    write_frame(row, time, orientation, motion, contacts, car, frames)
     for i in range(body.mass.shape[0]):
-        frames[row, Frame.POSES + 7 * i + 1] = body.side[i]
+        frames[row, Frame.POSES + SEGMENT_ENTRIES * i + 1] = body.side[i]
 
 
 @inlined_kernel

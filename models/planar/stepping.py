@@ -365,8 +365,8 @@ def simulate(step_space, each_body, model, data):
         shot = int(memory[Memory.SHOTS])
         if memory[Memory.TICKS] >= shot * settings.frame_every and shot < data.frames.shape[0]:
             write_poses(
-                shot, time, model.body, data.state, data.orientation, contacts, data.car,
-                data.frames,
+                shot, time, model.body, data.state, data.orientation, data.motion, contacts,
+                data.car, data.frames,
             )  # fmt: skip
             memory[Memory.SHOTS] += 1.0
         note_head(

@@ -349,14 +349,29 @@ def wrap_around_distance(vehicle_name: str, zone: int, point: Array) -> float:
     point : (2,) array
         x and z on the zone's surface, static car, m.
     """
+    step = np.diff(wrap_around_path(vehicle_name, zone, point), axis=0)
+    length = np.hypot(step[:, 0], step[:, 1])
+    return float(length[:-1].sum() + length[-1])
+
+
+def wrap_around_path(vehicle_name: str, zone: int, point: Array) -> Array:
+    """Return the corners (k, 2) of that tape, x and z of the static car, m.
+
+    Parameters
+    ----------
+    vehicle_name : str
+    zone : int
+        Row of the zone that contains the point.
+    point : (2,) array
+        x and z on the zone's surface, static car, m.
+    """
     line = _tape(vehicle_name, zone)
     step = np.diff(line, axis=0)
     ahead = np.arctan2(step[:, 1], step[:, 0])
     direct = np.arctan2(point[1] - line[:, 1], point[0] - line[:, 0])
     # The tape leaves the hull where the straight line to the point is flatter than the hull.
     leaves = np.append(direct[:-1] <= ahead + 1e-12, True)
-    k = int(np.argmax(leaves))
-    return float(np.hypot(step[:k, 0], step[:k, 1]).sum() + np.hypot(*(point - line[k])))
+    return np.concatenate([line[: int(np.argmax(leaves)) + 1], np.reshape(point, (1, 2))])
 
 
 def surface_point(zones: Zones, zone: int, point: Array) -> Array:

@@ -51,10 +51,22 @@ def wrap_distance(lines: Array, end: Array) -> float:
     end : (2,) array
         Point seen from ahead and above, m.
     """
+    return float(np.linalg.norm(np.diff(wrap_path(lines, end), axis=0), axis=1).sum())
+
+
+def wrap_path(lines: Array, end: Array) -> Array:
+    """Return the corners (k, 2) of that tape, x and z, m.
+
+    Parameters
+    ----------
+    lines : (k, 2, 2) array
+        Of the section, m.
+    end : (2,) array
+        Point seen from ahead and above, m.
+    """
     points = lines.reshape(-1, 2)
     ahead = points[points[:, 0] > end[0]]
-    path = tape_over(np.concatenate([ahead, end[None]]))
-    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+    return tape_over(np.concatenate([ahead, end[None]]))
 
 
 def leading_edge_distance(lines: Array) -> float:

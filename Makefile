@@ -53,8 +53,8 @@ headform-chain: install  ## the headform test on finite elements, its fitted cur
 	$(BIN)/python -m scripts.headform_chain
 
 lock: install  ## lock the newest versions that pyproject.toml allows
-	$(BIN)/python -m pip install --quiet uv
-	$(BIN)/uv pip compile --universal --python-version 3.11 --extra dev --extra cluster --no-annotate --no-header --quiet --upgrade pyproject.toml --output-file requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+	$(BIN)/uv pip compile --universal --python-version 3.11 --extra dev --extra docs --extra cluster --no-annotate --no-header --quiet --upgrade pyproject.toml --output-file requirements.lock
 
 clean:  ## remove .venv, caches and results (not the gallery)
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis *.egg-info build

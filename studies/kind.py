@@ -114,15 +114,17 @@ class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
         results = self.results(study, folder)
         analysis = self.analyse(study, results)
         done = partial(Finished, study, results)
-        for name, page in self.pages(study, results).items():
-            folder.write_text(name, page)
+        shown = self.pages(study, results, folder)
         return publish(
             folder,
             study.title,
             self.subtitle(done(analysis)),
             analysis,
             lambda held: self.draw(done(held)),
-            lambda held, figures: self.sections(done(held), figures),
+            lambda held, figures: [
+                *self.sections(done(held), figures),
+                *([Section("Explore the runs", pages=shown)] if shown else []),
+            ],
         )
 
     @abstractmethod
@@ -200,8 +202,8 @@ class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
     ) -> Sequence[Section]:
         """Return the sections of the report, from what ``draw`` returns."""
 
-    def pages(self, study: Study, results: Results) -> Mapping[str, str]:
-        """Return pages beside the report by file name; none unless a kind has some.
+    def pages(self, study: Study, results: Results, folder: ResultsFolder) -> Mapping[str, str]:
+        """Return interactive pages of the report by caption; none unless a kind has some.
 
         Parameters
         ----------
@@ -209,6 +211,8 @@ class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
             Study file of this kind, checked.
         results : Results
             From ``results``.
+        folder : ResultsFolder
+            Results folder of the study.
         """
         return {}
 

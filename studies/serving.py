@@ -121,13 +121,13 @@ def serve_study(results: ResultsFolder, port: int = 0) -> Server:
     def page(path: str) -> str | None:
         if path == "":
             return explore_runs(study, model, runs, address="run/")
-        found = re.fullmatch(r"run/(\d{1,9})", path)
+        found = re.fullmatch(r"run/(\d{1,9})(?:\+(\d{1,9}))?", path)
         if found is None:
             return None
-        number = int(found[1])
+        numbers = [int(text) for text in found.groups() if text]
         # A model's arrays are its own: one run at a time.
         with busy:
-            run = api.rerun(results, number)
-        return view_runs(f"Run {number}", {f"run {number}": run}) or None
+            shown = {f"run {number}": api.rerun(results, number) for number in numbers}
+        return view_runs(" and ".join(shown), shown) or None
 
     return Server(page, port)

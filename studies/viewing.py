@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from mcstudy.viewer import Curve, ViewedRun, render_viewer
+from mcstudy.viewer import Curve, ViewedRun, pack_run, render_viewer
 from models.protocol import Run
 
 
@@ -40,6 +41,9 @@ VIEWS = {
     ),
 }
 """Histories of the head that are drawn, by the name of their figure."""
+VIEWER_CAPTION = (
+    "The run in three dimensions: drag to turn, wheel to zoom, space to play, arrow keys to step."
+)
 EVENTS = {"head meets the car": "head_impact_time", "landing": "ground_time"}
 """Outputs that are times of events, by their label."""
 
@@ -53,21 +57,28 @@ def view_runs(title: str, runs: Mapping[str, Run]) -> str:
     runs : mapping
         Runs by label.
     """
-    viewed = [
-        ViewedRun(
-            label,
-            run.scene,
-            _curves(run),
-            {
-                name: run.outputs[output]
-                for name, output in EVENTS.items()
-                if np.isfinite(run.outputs.get(output, np.nan))
-            },
-        )
-        for label, run in runs.items()
-        if run.scene is not None
-    ]
-    return render_viewer(title, viewed) if viewed else ""
+    packed = [scene for label, run in runs.items() if (scene := pack_scene(label, run))]
+    return render_viewer(title, packed) if packed else ""
+
+
+def pack_scene(label: str, run: Run) -> dict[str, Any] | None:
+    """Return a run packed for the viewer, JSON-able; None if it has no scene.
+
+    Parameters
+    ----------
+    label : str
+    run : Run
+    """
+    if run.scene is None:
+        return None
+    events = {
+        name: run.outputs[output]
+        for name, output in EVENTS.items()
+        if np.isfinite(run.outputs.get(output, np.nan))
+    }
+    wad = run.outputs.get("wad", np.nan)
+    length = float(wad) if np.isfinite(wad) else None
+    return pack_run(ViewedRun(label, run.scene, _curves(run), events, length))
 
 
 def _curves(run: Run) -> list[Curve]:

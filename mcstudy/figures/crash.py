@@ -34,6 +34,15 @@ class MeshLike(Protocol):
     def time(self) -> Array | None: ...
 
 
+class ForcesLike(Protocol):
+    """Contact forces of a scene; see the model protocol."""
+
+    @property
+    def place(self) -> Array: ...
+    @property
+    def force(self) -> Array: ...
+
+
 class SceneLike(Protocol):
     """Poses of ellipsoids, meshes and car; see the model protocol."""
 
@@ -55,6 +64,10 @@ class SceneLike(Protocol):
     def plan(self) -> Array: ...
     @property
     def meshes(self) -> Sequence[MeshLike]: ...
+    @property
+    def forces(self) -> ForcesLike | None: ...
+    @property
+    def tape(self) -> Array | None: ...
 
 
 CAR = "car"

@@ -22,13 +22,17 @@ class Table:
 
 @dataclass(frozen=True)
 class Section:
-    """A section: heading, paragraphs, tables, figures and GIF files by caption."""
+    """A section: heading, paragraphs, tables; figures, GIF files and HTML pages by caption.
+
+    A page is shown in a frame of its own, with scripts that reach nothing outside it.
+    """
 
     heading: str
     paragraphs: Sequence[str] = ()
     tables: Sequence[Table] = ()
     figures: Mapping[str, Figure] = field(default_factory=dict)
     animations: Mapping[str, bytes] = field(default_factory=dict)
+    pages: Mapping[str, str] = field(default_factory=dict)
 
 
 def render(title: str, subtitle: str, sections: Sequence[Section]) -> str:
@@ -47,6 +51,7 @@ def render(title: str, subtitle: str, sections: Sequence[Section]) -> str:
             "heading": section.heading,
             "paragraphs": section.paragraphs,
             "tables": section.tables,
+            "pages": section.pages,
             "images": [
                 (caption, "image/png", _encode(png_bytes(figure)))
                 for caption, figure in section.figures.items()

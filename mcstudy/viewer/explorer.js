@@ -1,18 +1,17 @@
 "use strict";
-(function () {
-  const { bytes, byId, content } = window.mcstudy;
+window.mcstudy.start(async (content) => {
+  const { byId, inflate, unpack } = window.mcstudy;
+  await unpack(content.table);
+  const { columns, runs, states } = content.table;
+  const stored = new Map(content.stored.map((entry) => [entry.run, entry]));
 
-  const columns = content.columns;
   for (const column of columns) {
-    column.values = new Float32Array(bytes(column.values));
     let low = Infinity, high = -Infinity;
     for (const v of column.values) if (Number.isFinite(v)) { low = Math.min(low, v); high = Math.max(high, v); }
     if (!(low <= high)) { low = 0; high = 1; }
     if (low === high) { low -= 0.5; high += 0.5; }
     Object.assign(column, { low, high, brush: null });
   }
-  const runs = new Uint32Array(bytes(content.runs));
-  const states = new Uint8Array(bytes(content.states));
   const count = runs.length;
   const chosen = new Uint8Array(count);
   const order = Uint32Array.from({ length: count }, (_, k) => k);
@@ -62,6 +61,23 @@
     const size = Math.abs(value);
     return size >= 1000 ? Math.round(value).toLocaleString("en") : String(Number(value.toPrecision(3)));
   }
+  // An end of an axis, to a hundredth of its length.
+  function end(column, value) {
+    const places = Math.max(0, 2 - Math.floor(Math.log10(column.high - column.low)));
+    return value.toLocaleString("en", { maximumFractionDigits: Math.min(places, 20) });
+  }
+  // A label in one line or, where there is no room, in two.
+  function write(pen, label, x, y, room) {
+    const words = label.split(" ");
+    if (pen.measureText(label).width <= room || words.length < 2) { pen.fillText(label, x, y, room); return; }
+    let best = 1, least = Infinity;
+    for (let k = 1; k < words.length; k++) {
+      const wide = Math.max(...[words.slice(0, k), words.slice(k)].map((part) => pen.measureText(part.join(" ")).width));
+      if (wide < least) { least = wide; best = k; }
+    }
+    pen.fillText(words.slice(0, best).join(" "), x, y - 6, room);
+    pen.fillText(words.slice(best).join(" "), x, y + 7, room);
+  }
 
   // -- parallel coordinates ----------------------------------------------------------------------
   const TOP = 46, BOTTOM = 26, SIDE = 62;
@@ -108,8 +124,8 @@
       pen.fillText(column.label, k === 0 ? 4 : last ? width - 4 : x, k % 2 ? 30 : 14, room);
       pen.textAlign = "center";
       pen.fillStyle = style("--soft");
-      pen.fillText(short(column.high), x, TOP - 3);
-      pen.textBaseline = "top"; pen.fillText(short(column.low), x, height - BOTTOM + 4);
+      pen.fillText(end(column, column.high), x, TOP - 3);
+      pen.textBaseline = "top"; pen.fillText(end(column, column.low), x, height - BOTTOM + 4);
       if (column.brush) {
         const a = y(column, column.brush[1]), b = y(column, column.brush[0]);
         pen.fillStyle = ink.mark; pen.globalAlpha = 0.35; pen.fillRect(x - 8, a, 16, Math.max(b - a, 2)); pen.globalAlpha = 1;
@@ -141,14 +157,14 @@
     const rows = shown(), size = rows.length ? list[0].size + 6 : 0;
     pen.fillStyle = style("--ink"); pen.textAlign = "center"; pen.textBaseline = "middle";
     rows.forEach((column, k) => {
-      pen.save(); pen.translate(12, k * size + size / 2); pen.rotate(-Math.PI / 2); pen.fillText(column.label, 0, 0, size - 8); pen.restore();
-      pen.fillText(column.label, EDGE + k * size + size / 2, rows.length * size + 14, size - 8);
+      pen.save(); pen.translate(14, k * size + size / 2); pen.rotate(-Math.PI / 2); write(pen, column.label, 0, 0, size - 8); pen.restore();
+      write(pen, column.label, EDGE + k * size + size / 2, rows.length * size + 12, size - 8);
       pen.save(); pen.fillStyle = style("--soft"); pen.textAlign = "right";
-      pen.fillText(short(column.high), EDGE - 4, k * size + 8, EDGE - 24); pen.fillText(short(column.low), EDGE - 4, (k + 1) * size - 14, EDGE - 24);
+      pen.fillText(end(column, column.high), EDGE - 4, k * size + 8, EDGE - 30); pen.fillText(end(column, column.low), EDGE - 4, (k + 1) * size - 14, EDGE - 30);
       pen.restore();
       if (size < 80) return;
-      pen.save(); pen.fillStyle = style("--soft"); pen.textAlign = "left"; pen.fillText(short(column.low), EDGE + k * size, rows.length * size + 32);
-      pen.textAlign = "right"; pen.fillText(short(column.high), EDGE + (k + 1) * size - 8, rows.length * size + 32); pen.restore();
+      pen.save(); pen.fillStyle = style("--soft"); pen.textAlign = "left"; pen.fillText(end(column, column.low), EDGE + k * size, rows.length * size + 34);
+      pen.textAlign = "right"; pen.fillText(end(column, column.high), EDGE + (k + 1) * size - 8, rows.length * size + 34); pen.restore();
     });
     if (drag && drag.canvas === "matrix" && drag.moved) {
       pen.strokeStyle = ink.mark; pen.lineWidth = 1.5;
@@ -223,17 +239,43 @@
       line.insertCell().textContent = column.label;
       line.insertCell().textContent = short(column.values[row]);
     }
-    const how = document.createElement("p");
-    if (content.address) {
-      const frame = document.createElement("iframe");
-      frame.title = `Run ${runs[row]} in three dimensions`;
-      frame.src = `${content.address}${runs[row]}`;
-      box.append(head, frame, table);
-    } else {
-      how.textContent = `To see it: mcstudy view FOLDER --run ${runs[row]}, with the folder of this page`;
-      box.append(head, how, table);
-    }
+    box.append(head, table);
+    show(runs[row]);
   }
+  // A run in three dimensions: from the server, or one of those that the page holds.
+  let held = null, shell = null;
+  function show(run) {
+    const box = byId("view");
+    box.hidden = false;
+    box.replaceChildren();
+    if (!content.address && !stored.has(run)) {
+      const how = document.createElement("p");
+      how.textContent = `To see it: mcstudy view FOLDER --run ${run}, with the folder of this study`;
+      box.append(how);
+      return;
+    }
+    const both = held !== null && held !== run ? [held, run] : [run];
+    const frame = document.createElement("iframe"), keep = document.createElement("button");
+    frame.title = `Run ${both.join(" and run ")} in three dimensions`;
+    frame.allow = "fullscreen";
+    keep.type = "button"; keep.id = "compare";
+    keep.textContent = held === run ? "Compare with no run" : "Compare with the next run";
+    keep.addEventListener("click", () => { held = held === run ? null : run; pick(picked); });
+    box.append(keep, frame);
+    if (content.address) frame.src = content.address + both.join("+");
+    else fill(frame, both.map((number) => stored.get(number).packed));
+  }
+  async function fill(frame, packed) {
+    shell = shell || new TextDecoder().decode(await inflate(content.viewer));
+    const text = JSON.stringify({ runs: packed }).replace(/</g, "\\u003c");
+    frame.srcdoc = shell.replace(content.mark, () => text);
+  }
+  if (stored.size) {
+    const list = byId("stored");
+    list.add(new Option("choose", ""));
+    for (const { run, why } of content.stored) list.add(new Option(`run ${run}: ${why}`, run));
+    list.addEventListener("change", () => { if (list.value) pick(runs.indexOf(Number(list.value))); });
+  } else byId("stored").parentElement.hidden = true;
   byId("run").addEventListener("change", () => pick(runs.indexOf(Number(byId("run").value))));
   byId("reset").addEventListener("click", () => { columns.forEach((column) => { column.brush = null; }); choose(); });
   for (const column of columns) {
@@ -333,7 +375,7 @@
     if (column) column.brush = text.split(":").map(Number);
   }
   choose();
+  if (stored.size && !asked.has("run")) pick(runs.indexOf(content.stored[0].run));
   if (asked.has("run")) pick(runs.indexOf(Number(asked.get("run"))));
   tick();
-  document.body.dataset.ready = "1";
-})();
+});

@@ -1,13 +1,14 @@
 """The explorer of a study: parallel coordinates and scatter matrix with linked choices."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.viewer.content import pack_array
-from mcstudy.viewer.page import render_page
+from mcstudy.viewer.packing import Packer, pack_text
+from mcstudy.viewer.page import MARK, render_page, viewer_shell
 
 Array = NDArray[np.float64]
 
@@ -24,6 +25,15 @@ class Column:
     values: Array
 
 
+@dataclass(frozen=True)
+class Stored:
+    """A run that the page shows in three dimensions: number, why it is kept, from ``pack_run``."""
+
+    run: int
+    why: str
+    packed: Mapping[str, Any]
+
+
 def render_explorer(
     title: str,
     runs: NDArray[np.int64],
@@ -31,6 +41,7 @@ def render_explorer(
     columns: Sequence[Column],
     first: Sequence[str],
     *,
+    stored: Sequence[Stored] = (),
     address: str = "",
 ) -> str:
     """Return an HTML page on which the runs of a study are explored, without a network.
@@ -46,31 +57,39 @@ def render_explorer(
         Inputs and outputs.
     first : sequence of str
         Names of the axes that are shown first, the most important ones in front.
+    stored : sequence of Stored
+        Runs that the page shows in three dimensions.
     address : str
-        Start of the address at which a server shows a run; empty for a file.
+        Start of the address at which a server shows any run; empty for a file.
     """
     names, codes = np.unique(np.asarray(status, dtype=str), return_inverse=True)
     counts = np.bincount(codes, minlength=names.size)
-    shown = list(first)[:SHOWN]
-    content = {
-        "title": title,
-        "address": address,
-        "runs": pack_array(runs, "<u4"),
-        "states": pack_array(codes, "<u1"),
-        "statuses": [
-            {"name": str(name).replace("_", " "), "count": int(k)}
-            for name, k in zip(names, counts, strict=True)
-        ],
+    shown, packer = list(first)[:SHOWN], Packer()
+    table = {
+        "runs": packer.add(runs, "u4"),
+        "states": packer.add(codes, "u1"),
         "columns": [
             {
                 "name": column.name,
                 "label": column.label,
                 "shown": column.name in shown,
-                "values": pack_array(column.values),
+                "values": packer.add(column.values),
             }
             for column in sorted(
                 columns, key=lambda c: shown.index(c.name) if c.name in shown else SHOWN
             )
         ],
+    }
+    content = {
+        "title": title,
+        "address": address,
+        "mark": MARK,
+        "viewer": pack_text(viewer_shell(title)) if stored and not address else "",
+        "stored": [vars(entry) for entry in stored],
+        "statuses": [
+            {"name": str(name).replace("_", " "), "count": int(k)}
+            for name, k in zip(names, counts, strict=True)
+        ],
+        "table": table | {"data": packer.data()},
     }
     return render_page("explorer", title, content, styles=("viewer.css", "explorer.css"))

@@ -7,31 +7,39 @@ from typing import Any
 
 from jinja2 import Environment
 
-from mcstudy.viewer.content import ViewedRun, pack_run
 from mcstudy.viewer.library import three_js
+from mcstudy.viewer.packing import pack_text
+
+MARK = "@content@"
+"""Place of the content in a page without any."""
 
 
-def render_viewer(title: str, runs: Sequence[ViewedRun]) -> str:
+def render_viewer(title: str, runs: Sequence[Mapping[str, Any]]) -> str:
     """Return an HTML page that shows runs in three dimensions, without a network.
 
     Parameters
     ----------
     title : str
-    runs : sequence of ViewedRun
-        At least one; the first one is solid, the others are ghosts over it or stand beside it.
+    runs : sequence of mapping
+        At least one, each from ``pack_run``; the first one is solid, the others are ghosts over it
+        or stand beside it.
     """
-    content = {"title": title, "runs": [pack_run(run) for run in runs]}
-    return render_page("viewer", title, content, styles=("viewer.css",), library=three_js())
+    return viewer_shell(title).replace(MARK, _as_text({"runs": list(runs)}))
 
 
-def render_page(
-    name: str,
-    title: str,
-    content: Mapping[str, Any],
-    *,
-    styles: Sequence[str],
-    library: str = "",
-) -> str:
+def viewer_shell(title: str) -> str:
+    """Return the viewer's page with ``MARK`` in place of its content.
+
+    Parameters
+    ----------
+    title : str
+    """
+    # A title of users could hold the mark.
+    title = title.replace(MARK, "")
+    return _render("viewer", title, MARK, styles=("viewer.css",), library=pack_text(three_js()))
+
+
+def render_page(name: str, title: str, content: Mapping[str, Any], *, styles: Sequence[str]) -> str:
     """Return a page from its template, style and program, with its content inside.
 
     Parameters
@@ -43,19 +51,27 @@ def render_page(
         What the program shows, JSON-able.
     styles : sequence of str
         Files of the style.
-    library : str
-        Script that the program uses.
     """
+    return _render(name, title, _as_text(content), styles=styles)
+
+
+def _as_text(content: Mapping[str, Any]) -> str:
+    # Text of users must not end the script that holds it.
+    return json.dumps(content).replace("<", "\\u003c")
+
+
+def _render(
+    name: str, title: str, content: str, *, styles: Sequence[str], library: str = ""
+) -> str:
     folder = files("mcstudy.viewer")
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     template = environment.from_string(folder.joinpath(f"{name}.html").read_text("utf-8"))
     return template.render(
         title=title,
         style="\n".join(folder.joinpath(style).read_text("utf-8") for style in styles),
-        library=library.replace("</script", "<\\/script"),
+        library=library,
         program="\n".join(
             folder.joinpath(script).read_text("utf-8") for script in ("content.js", f"{name}.js")
         ),
-        # Text of users must not end the script that holds it.
-        content=json.dumps(content).replace("<", "\\u003c"),
+        content=content,
     )

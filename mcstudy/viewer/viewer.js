@@ -1,27 +1,32 @@
 "use strict";
-(function () {
-  const { bytes, byId, content } = window.mcstudy;
+window.mcstudy.start(async (content) => {
+  const { byId, inflate, unpack } = window.mcstudy;
+  const script = document.createElement("script");
+  script.textContent = new TextDecoder().decode(await inflate(byId("library").textContent));
+  document.head.append(script);
+  await Promise.all(content.runs.map(unpack));
   const problem = (text) => { byId("problem").hidden = false; byId("problem").textContent = text; };
 
   const PALETTE = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00"];
   const LEFT = 0xe69f00, RIGHT = 0x56b4e9, TRUNK = 0xb9c6cf, CAR = 0xdfe5e8;
+  const FORCE = 0xd5197a, TAPE = 0xf0c000;
+  const METRES_A_KILONEWTON = 0.1, LONGEST = 1.5, TIP = 0.09;
   const APART = 2.8;
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
 
-  const floats = (text) => new Float32Array(bytes(text));
-
-  for (const run of content.runs) {
-    for (const key of ["time", "centre", "orientation", "car"]) run[key] = floats(run[key]);
-    run.outline = run.outline.map(floats);
-    run.curves.forEach((c) => { c.time = floats(c.time); c.values = floats(c.values); });
-  }
   const end = Math.max(...content.runs.map((run) => run.time[run.time.length - 1]));
 
   // -- the scene ---------------------------------------------------------------------------------
   const frame = byId("scene");
+  // A processor that draws smooths still pictures only, by drawing them larger.
+  const slow = (() => {
+    const gl = document.createElement("canvas").getContext("webgl");
+    const known = gl && gl.getExtension("WEBGL_debug_renderer_info");
+    return Boolean(known) && /swiftshader|llvmpipe|software/i.test(gl.getParameter(known.UNMASKED_RENDERER_WEBGL));
+  })();
   let renderer;
   try {
-    renderer = new THREE.WebGLRenderer({ antialias: true });
+    renderer = new THREE.WebGLRenderer({ antialias: !slow });
   } catch (error) {
     problem("This browser shows no WebGL: the scene cannot be drawn, the curves below can.");
   }
@@ -81,15 +86,9 @@
   }
   function surface(mesh) {
     const shape = new THREE.BufferGeometry();
-    mesh.base = floats(mesh.nodes);
-    shape.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(mesh.base), 3));
-    shape.setIndex(new THREE.BufferAttribute(new Uint32Array(bytes(mesh.faces)), 1));
+    shape.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(mesh.nodes), 3));
+    shape.setIndex(new THREE.BufferAttribute(mesh.faces, 1));
     shape.computeVertexNormals();
-    if (mesh.change) {
-      mesh.film = floats(mesh.film_time);
-      mesh.rows = new Uint32Array(bytes(mesh.moved));
-      mesh.offsets = new Int16Array(bytes(mesh.change));
-    }
     return shape;
   }
   function trace(run, name, colour) {
@@ -104,6 +103,46 @@
     const line = new THREE.Line(shape, new THREE.LineBasicMaterial({ color: colour }));
     line.frustumCulled = false;
     return line;
+  }
+  // An arrow of one metre along x; seen through the bodies.
+  const shaft = new THREE.CylinderGeometry(0.012, 0.012, 1, 8).translate(0, 0.5, 0).rotateZ(-Math.PI / 2);
+  const tip = new THREE.ConeGeometry(0.035, TIP, 12).translate(0, -TIP / 2, 0).rotateZ(-Math.PI / 2);
+  function arrows(run) {
+    let most = 0;
+    for (let f = 0; f + 1 < run.forces.first.length; f++) most = Math.max(most, run.forces.first[f + 1] - run.forces.first[f]);
+    const paint = new THREE.MeshBasicMaterial({ color: FORCE, depthTest: false, transparent: true });
+    return Array.from({ length: most }, () => {
+      const arrow = new THREE.Group();
+      for (const shape of [shaft, tip]) {
+        const part = new THREE.Mesh(shape, paint);
+        part.renderOrder = 2;
+        arrow.add(part);
+      }
+      run.group.add(arrow);
+      return arrow;
+    });
+  }
+  const aim = new THREE.Vector3(), AXIS = new THREE.Vector3(1, 0, 0);
+  function push(run, row) {
+    const from = run.forces.first[row], many = byId("forces").checked ? run.forces.first[row + 1] - from : 0;
+    run.arrows.forEach((arrow, k) => {
+      arrow.visible = k < many;
+      if (!arrow.visible) return;
+      const at = 3 * (from + k), { place, force } = run.forces;
+      aim.set(force[at], force[at + 1], force[at + 2]);
+      const length = Math.min(METRES_A_KILONEWTON * aim.length() / 1000, LONGEST);
+      arrow.position.set(place[at], place[at + 1], place[at + 2]);
+      arrow.quaternion.setFromUnitVectors(AXIS, aim.normalize());
+      arrow.children[0].scale.set(length, 1, 1);
+      arrow.children[1].position.set(length + TIP / 2, 0, 0);
+    });
+  }
+  function tapeOf(run) {
+    const points = Array.from({ length: run.tape.length / 3 }, (_, k) => new THREE.Vector3(run.tape[3 * k] + 0.004, run.tape[3 * k + 1], run.tape[3 * k + 2] + 0.004));
+    const path = new THREE.CurvePath();
+    for (let k = 0; k + 1 < points.length; k++) path.add(new THREE.LineCurve3(points[k], points[k + 1]));
+    const shape = new THREE.TubeGeometry(path, 8 * points.length, 0.012, 6);
+    return new THREE.Mesh(shape, new THREE.MeshBasicMaterial({ color: TAPE }));
   }
   content.runs.forEach((run, number) => {
     const ghost = number > 0;
@@ -134,6 +173,8 @@
     const colour = new THREE.Color(PALETTE[number % PALETTE.length]);
     run.traces = [trace(run, "head", colour), trace(run, "hip", colour)].filter(Boolean);
     run.traces.forEach((line) => run.group.add(line));
+    run.arrows = run.forces ? arrows(run) : [];
+    if (run.tape) { run.band = tapeOf(run); run.carGroup.add(run.band); }
     scene.add(run.group);
   });
 
@@ -157,18 +198,20 @@
     run.carGroup.position.set(x, y, 0);
     run.carGroup.rotation.z = mix(run.car[3 * low + 2], run.car[3 * high + 2]);
     run.traces.forEach((line) => { line.visible = byId("trace").checked; line.geometry.setDrawRange(0, low + 1); });
+    if (run.forces) push(run, share < 0.5 ? low : high);
+    if (run.band) run.band.visible = byId("tape").checked;
     for (const mesh of run.meshes) if (mesh.change) deform(mesh, at);
     return [x, y];
   }
   function deform(mesh, at) {
     let k = 0;
-    while (k + 1 < mesh.film.length && mesh.film[k + 1] <= at) k++;
+    while (k + 1 < mesh.film_time.length && mesh.film_time[k + 1] <= at) k++;
     if (mesh.shown === k) return;
     mesh.shown = k;
-    const array = mesh.object.geometry.attributes.position.array, count = mesh.rows.length;
+    const array = mesh.object.geometry.attributes.position.array, count = mesh.moved.length;
     for (let j = 0; j < count; j++) {
-      const row = 3 * mesh.rows[j], from = 3 * (k * count + j);
-      for (let c = 0; c < 3; c++) array[row + c] = mesh.base[row + c] + mesh.step * mesh.offsets[from + c];
+      const row = 3 * mesh.moved[j], from = 3 * (k * count + j);
+      for (let c = 0; c < 3; c++) array[row + c] = mesh.nodes[row + c] + mesh.change[from + c];
     }
     mesh.object.geometry.attributes.position.needsUpdate = true;
     mesh.object.geometry.computeVertexNormals();
@@ -197,11 +240,24 @@
     const width = frame.clientWidth, height = frame.clientHeight;
     camera.aspect = width / height;
     camera.updateProjectionMatrix();
-    if (renderer) { renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2)); renderer.setSize(width, height); }
+    if (renderer) { sharpen(sharpness); renderer.setSize(width, height); }
     if (controls) controls.handleResize();
     const plot = byId("plot"), ratio = window.devicePixelRatio || 1;
     plot.width = plot.clientWidth * ratio; plot.height = plot.clientHeight * ratio;
     wanted = true;
+  }
+  // While it plays, the picture is as coarse as the frame rate needs.
+  const FINEST = slow ? 1.5 : 1, COARSEST = 0.5, LONG_FRAME = 42, SETTLED = 8;
+  let sharpness = FINEST, drawn = 0, interval = 0;
+  function sharpen(to) {
+    sharpness = to;
+    renderer.setPixelRatio(sharpness * Math.min(window.devicePixelRatio, 2));
+  }
+  function keepPace(stamp) {
+    interval += (stamp - before - interval) / Math.min(++drawn, SETTLED);
+    if (drawn < SETTLED || interval < LONG_FRAME || sharpness <= COARSEST) return;
+    sharpen(Math.max(COARSEST, 0.75 * sharpness));
+    drawn = 0;
   }
   function show() {
     content.runs.forEach((run, number) => {
@@ -223,6 +279,7 @@
   const instant = (p) => (end <= EARLY ? p * end : p < 0.5 ? 2 * p * EARLY : EARLY + (2 * p - 1) * (end - EARLY));
   function tick(stamp) {
     if (playing) {
+      if (before !== null && renderer) keepPace(stamp);
       if (before !== null) now += Number(byId("speed").value) * Math.min((stamp - before) / 1000, 0.1);
       if (now >= end) { now = end; play(false); }
       wanted = true;
@@ -236,6 +293,9 @@
   function play(on) {
     playing = on;
     if (on && now >= end) now = 0;
+    drawn = 0;
+    if (renderer) sharpen(on ? Math.min(sharpness, 1) : FINEST);
+    wanted = true;
     byId("play").textContent = on ? "Pause" : "Play";
   }
   function go(to) { now = Math.min(Math.max(to, 0), end); wanted = true; }
@@ -245,24 +305,39 @@
   labels.forEach((label) => byId("curve").add(new Option(label, label)));
   if (!labels.length) byId("history").hidden = true;
   if (content.runs.length < 2) byId("arranged").hidden = true;
+  for (const name of ["forces", "tape"]) byId(`shown-${name}`).hidden = !content.runs.some((run) => run[name]);
+  byId("whole").hidden = !document.fullscreenEnabled;
+  byId("whole").addEventListener("click", () => {
+    if (document.fullscreenElement) document.exitFullscreen(); else document.documentElement.requestFullscreen();
+  });
   content.runs.forEach((run, number) => {
     const entry = document.createElement("span");
-    entry.textContent = run.label;
+    entry.textContent = run.wad ? `${run.label}: WAD ${run.wad.toFixed(2)} m` : run.label;
     entry.style.setProperty("--colour", PALETTE[number % PALETTE.length]);
     byId("legend").append(entry);
   });
   let box = null;
+  // The span of time that is shown grows in stages: the curves are drawn once a stage.
+  const STAGES = [0.15, 0.3, 0.6, 1.2, 2.4, 4.8, 9.6].filter((t) => t < end).concat(end);
+  let shownPlot = "";
   function draw() {
     const label = byId("curve").value;
     if (!label) return;
+    const plot = byId("plot"), until = STAGES.find((t) => now <= t);
+    const key = [label, until, plot.width, plot.height, dark.matches].join();
+    if (key !== shownPlot) { shownPlot = key; drawCurves(label, until); }
+    const at = box.left + (box.right - box.left) * now / until;
+    byId("cursor").style.transform = `translate(${at}px, ${box.top}px)`;
+    byId("cursor").style.height = `${box.bottom - box.top}px`;
+  }
+  function drawCurves(label, until) {
     const plot = byId("plot"), pen = plot.getContext("2d"), ratio = window.devicePixelRatio || 1;
     const css = getComputedStyle(document.body);
-    const ink = css.getPropertyValue("--ink"), line = css.getPropertyValue("--line"), soft = css.getPropertyValue("--soft");
+    const line = css.getPropertyValue("--line"), soft = css.getPropertyValue("--soft");
     const width = plot.width / ratio, height = plot.height / ratio;
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, height);
     const shown = content.runs.map((run) => run.curves.find((curve) => curve.label === label));
-    const until = Math.min(end, Math.max(0.15, now * 1.15));
     let low = 0, high = 0;
     shown.forEach((curve) => {
       if (curve) curve.values.forEach((v, k) => { if (curve.time[k] <= until) { low = Math.min(low, v); high = Math.max(high, v); } });
@@ -294,7 +369,6 @@
       }
       pen.stroke();
     });
-    pen.strokeStyle = ink; pen.lineWidth = 1.5; pen.beginPath(); pen.moveTo(x(now), box.top); pen.lineTo(x(now), box.bottom); pen.stroke();
   }
   function ticks(low, high) {
     const raw = (high - low) / 6, power = Math.pow(10, Math.floor(Math.log10(raw)));
@@ -307,7 +381,7 @@
   // -- what people do ----------------------------------------------------------------------------
   byId("play").addEventListener("click", () => play(!playing));
   byId("time").addEventListener("input", (event) => { play(false); go(instant(event.target.value / 1000)); });
-  for (const name of ["follow", "trace", "curve"]) byId(name).addEventListener("change", () => { wanted = true; });
+  for (const name of ["follow", "trace", "forces", "tape", "curve"]) byId(name).addEventListener("change", () => { wanted = true; });
   byId("view").addEventListener("change", look);
   byId("arrangement").addEventListener("change", look);
   dark.addEventListener("change", colours);
@@ -333,5 +407,4 @@
   colours(); resize(); look();
   if (asked.has("play")) play(true);
   window.requestAnimationFrame(tick);
-  document.body.dataset.ready = "1";
-})();
+});

@@ -14,7 +14,7 @@ from models.protocol import Model, Run
 from studies.method_comparison.schema import MethodComparison
 from studies.published_tables import PublishedTable, as_table, compare_methods_with_table
 from studies.reconstruction.study import PRIMARY
-from studies.viewing import VIEWS
+from studies.viewing import VIEWER_CAPTION, VIEWS, view_runs
 
 MARGIN = 0.03
 """s of acceleration that is shown around the impacts of the head."""
@@ -154,9 +154,12 @@ def sections_of(
             if name in study.fixed
         ]
     shown = {captions[name]: figure for name, figure in figures.items()}
+    page = view_runs(study.title, runs)
+    viewer = {VIEWER_CAPTION: page} if page else {}
     kinematics = captions["kinematics"]
     return [
         Section("Comparison with the published tables", said, [as_table(t) for t in tables]),
+        Section("In three dimensions", pages=viewer),
         Section("Kinematics", (), (),
                 {kinematics: shown.pop(kinematics)} if "kinematics" in figures else {}),
         Section("Histories", (), (), shown),

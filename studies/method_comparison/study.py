@@ -20,7 +20,6 @@ from models.registry import load_model
 from studies.method_comparison.report import compare, draw, sections_of, summarise, units_of
 from studies.method_comparison.schema import MethodComparison
 from studies.published_tables import PublishedTable
-from studies.viewing import view_runs
 
 
 def compare_methods(
@@ -141,9 +140,6 @@ def _write(
         folder.write_json(ANALYSIS, analysis)
         for k, run in enumerate(runs.values()):
             folder.add_histories(k, run.histories)
-        page = view_runs(study.title, runs)
-        if page:
-            folder.write_text("viewer.html", page)
         figures = draw(study, runs)
         style.save(figures, folder.path / "figures")
         named = ", ".join(f"{label} ({model.name})" for label, model in models.items())

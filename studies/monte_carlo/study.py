@@ -10,13 +10,14 @@ from mcstudy.execution.workers import Workers
 from mcstudy.report import Section, Table
 from mcstudy.studyfile.study_outputs import report_outputs
 from models.protocol import Model
-from studies.explorer import explore_runs
+from studies.explorer import explorer_pages
 from studies.kind import Finished, StudyKind
 from studies.monte_carlo.analysis import MonteCarloAnalysis, analyse, marks_of
 from studies.monte_carlo.design import plan_design, run_design, runs_of_design
 from studies.monte_carlo.report import draw, sections_of, summarise
 from studies.monte_carlo.schema import MonteCarloStudy
 from studies.runs import ModelRuns, RunPlan, load_study_model
+from studies.stored_scenes import Measured, keep_scenes
 
 Done = Finished[MonteCarloStudy, ModelRuns, MonteCarloAnalysis]
 
@@ -60,6 +61,17 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns, MonteCarloAnalys
         """
         runs = run_design(study, plan, folder, workers=workers, quiet=quiet)
         _keep_histories(study, plan.model, runs, folder)
+        observed = {
+            output: mark.value
+            for output, marks in marks_of(study, plan.model).items()
+            for mark in marks
+            if mark.kind == "observed"
+        }
+        near = [
+            Measured(name, value, float(runs[name].std()) or 1.0)
+            for name, value in observed.items()
+        ]
+        keep_scenes(study, plan.model, runs, folder, near)
 
     def results(self, study: MonteCarloStudy, folder: ResultsFolder) -> ModelRuns:
         """Return the model and the runs of the design."""
@@ -81,9 +93,11 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns, MonteCarloAnalys
         """Return the figures by file name."""
         return draw(done.study, done.results.model, done.results.runs, done.analysis)
 
-    def pages(self, study: MonteCarloStudy, results: ModelRuns) -> Mapping[str, str]:
+    def pages(
+        self, study: MonteCarloStudy, results: ModelRuns, folder: ResultsFolder
+    ) -> Mapping[str, str]:
         """Return the explorer of the runs."""
-        return {"explorer.html": explore_runs(study, results.model, results.runs)}
+        return explorer_pages(study, results.model, results.runs, folder)
 
     def sections(self, done: Done, figures: Mapping[str, Any]) -> Sequence[Section]:
         """Return the sections of the report."""

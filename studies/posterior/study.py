@@ -13,15 +13,16 @@ from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import Workers
 from mcstudy.report import Section, Table
 from mcstudy.studyfile.study_outputs import report_outputs
-from studies.explorer import explore_runs
+from studies.explorer import explorer_pages
 from studies.kind import Finished, StudyKind
 from studies.monte_carlo.design import plan_design, run_design, runs_of_design
 from studies.posterior.analysis import analyse
-from studies.posterior.evidence import check_tables
+from studies.posterior.evidence import check_tables, items_of
 from studies.posterior.numbers import PosteriorAnalysis
 from studies.posterior.report import draw, sections_of, summarise
 from studies.posterior.schema import PosteriorStudy
 from studies.runs import ModelRuns, RunPlan, load_study_model
+from studies.stored_scenes import Measured, keep_scenes
 
 Done = Finished[PosteriorStudy, ModelRuns, PosteriorAnalysis]
 
@@ -63,7 +64,13 @@ class PosteriorOf(StudyKind[PosteriorStudy, RunPlan, ModelRuns, PosteriorAnalysi
         quiet : bool
             No progress line.
         """
-        run_design(study, plan, folder, workers=workers, quiet=quiet)
+        runs = run_design(study, plan, folder, workers=workers, quiet=quiet)
+        near = [
+            Measured(item.name, item.value, item.sd)
+            for item in items_of(study, plan.model).values()
+            if item.value is not None
+        ]
+        keep_scenes(study, plan.model, runs, folder, near)
 
     def results(self, study: PosteriorStudy, folder: ResultsFolder) -> ModelRuns:
         """Return the model and the runs of the design."""
@@ -85,9 +92,11 @@ class PosteriorOf(StudyKind[PosteriorStudy, RunPlan, ModelRuns, PosteriorAnalysi
         """Return the figures by file name."""
         return draw(done.analysis)
 
-    def pages(self, study: PosteriorStudy, results: ModelRuns) -> Mapping[str, str]:
+    def pages(
+        self, study: PosteriorStudy, results: ModelRuns, folder: ResultsFolder
+    ) -> Mapping[str, str]:
         """Return the explorer of the runs."""
-        return {"explorer.html": explore_runs(study, results.model, results.runs)}
+        return explorer_pages(study, results.model, results.runs, folder)
 
     def sections(self, done: Done, figures: Mapping[str, Any]) -> Sequence[Section]:
         """Return the sections of the report."""

@@ -22,7 +22,7 @@ from studies.published_tables import PublishedTable, as_table, compare_with_tabl
 from studies.reconstruction.schema import Reconstruction
 from studies.reconstruction.variants import VariantOutcome, variant_ranges, variant_table
 from studies.runs import load_study_model
-from studies.viewing import VIEWS, view_runs
+from studies.viewing import VIEWER_CAPTION, VIEWS, view_runs
 
 LONG = 5.0
 """CPU time (s) of a run from which on its progress is shown."""
@@ -161,7 +161,6 @@ def write_reconstruction(
         style.save(figures, folder.path / "figures")
         animations = {}
         if run.scene is not None:
-            folder.write_text("viewer.html", view_runs(study.title, {model.name: run}))
             gif = folder.path / "figures" / "crash.gif"
             crash.write_animation(run.scene, gif)
             animations["The whole crash, from the side and from above."] = gif.read_bytes()
@@ -211,11 +210,12 @@ def _report(
         name: {captions[name]: figures[name]} if name in figures else {}
         for name in ("kinematics", "dents", "variants")
     }
+    viewer = {VIEWER_CAPTION: view_runs(study.title, {model.name: run})} if run.scene else {}
     rest = {captions[name]: figure for name, figure in figures.items() if name not in apart}
     sections = [
         Section("Comparison with the published tables", (), [as_table(table) for table in tables]),
         Section("One change at a time", *_variants_said(study, model, variants), apart["variants"]),
-        Section("Kinematics", (), (), apart["kinematics"], animations),
+        Section("Kinematics", (), (), apart["kinematics"], animations, viewer),
         Section("Dents", (), (), apart["dents"]),
         Section("Histories", (), (), rest),
         Section("Numbers", (), numbers),

@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install study diagnose-demo case test test-slow check benchmark gallery calibrate headform-chain lock clean
+.PHONY: help install docs study diagnose-demo case test test-slow check benchmark gallery calibrate headform-chain lock clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 24
@@ -39,6 +39,9 @@ check: install  ## ruff, mypy and the import rules
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+docs: install  ## run all commands of the manual and build it, with its figures
+	$(BIN)/python -m scripts.manual
 
 benchmark: install  ## time a step and a crash, ours and MuJoCo's, in one run
 	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-only -s

@@ -81,4 +81,12 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text.removeprefix("\ufeff"))
     except (ValueError, RecursionError) as error:
-        raise UserError(f"{source}: not valid TOML: {str(error)[:200]}") from None
+        raise UserError(f"{source}: not valid TOML: {_told(str(error), text)}") from None
+
+
+def _told(message: str, text: str) -> str:
+    """Return the message of TOML's reader, with the cure where a Windows path is at fault."""
+    place = re.search(r"\(at line (\d+),", message)
+    line = lines_of(text)[int(place[1]) - 1] if place else ""
+    cure = "; a path with \\ stands in single quotes, or has / instead"
+    return message[:200] + (cure if re.search(r'"[^"]*\\', line) else "")

@@ -16,6 +16,7 @@ from mcstudy.execution.results import ANALYSIS, ResultsFolder
 from mcstudy.execution.workers import Workers
 from mcstudy.files import read_study_text
 from mcstudy.report import Table
+from mcstudy.studyfile.lines import naming_lines
 from mcstudy.studyfile.schema import AnyStudy, CommonStudy
 from models.protocol import Run
 from studies.kinds import KINDS, load_study, parse_study
@@ -71,11 +72,13 @@ def run_study(
     if isinstance(study, MethodComparison):
         if isinstance(workers, str):
             raise UserError(f"{path}: a {study.kind} has one run a method; leave --cluster out")
-        compare_methods(study, text, folder, workers=workers, quiet=quiet)
+        with naming_lines(str(path), text):
+            compare_methods(study, text, folder, workers=workers, quiet=quiet)
         return folder
     if study.kind not in KINDS:
         raise UserError(f"{path}: kind {study.kind!r} is run by 'mcstudy reconstruct'")
-    KINDS[study.kind].run(study, text, folder, workers=workers, quiet=quiet)
+    with naming_lines(str(path), text):
+        KINDS[study.kind].run(study, text, folder, workers=workers, quiet=quiet)
     return folder
 
 
@@ -137,7 +140,8 @@ def run_case(
     if not isinstance(study, Reconstruction):
         raise UserError(f"{path}: kind {study.kind!r} is run by 'mcstudy run'")
     folder = results_folder(study, out)
-    run, tables = reconstruct(study, quiet=quiet)
+    with naming_lines(str(path), text):
+        run, tables = reconstruct(study, quiet=quiet)
     variants = run_variants(study)
     write_reconstruction(study, text, run, tables, folder, variants)
     return run, tables, folder

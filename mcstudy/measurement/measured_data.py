@@ -28,6 +28,7 @@ from mcstudy.files import parse_toml, read_study_text
 from mcstudy.measurement import isomme
 from mcstudy.measurement.sampling_times import regular_times
 from mcstudy.studyfile.distributions import Distribution, Unit
+from mcstudy.studyfile.lines import with_line
 from mcstudy.studyfile.reading import first_problem
 from mcstudy.tables import TextTable, read_csv
 
@@ -188,11 +189,12 @@ def load_measured(folder: Path | str, channels: Sequence[str] = ()) -> Measured:
 
 def _read_folder(folder: Path) -> Measured:
     place = folder / HEADER
-    table = parse_toml(read_study_text(place), str(place))
+    text = read_study_text(place)
+    table = parse_toml(text, str(place))
     try:
         header = Header.model_validate(table)
     except ValidationError as error:
-        raise UserError(f"{place}: {first_problem(error, table)}") from None
+        raise UserError(f"{place}: {with_line(first_problem(error, table), text)}") from None
     if "test" in {*header.inputs, *header.scalars}:
         raise UserError(f"{place}: 'test' is the id of a test, it cannot be an input or a scalar")
     named = read_csv(folder / "tests.csv", text=("test",))

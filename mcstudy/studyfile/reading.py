@@ -7,6 +7,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from mcstudy.errors import UserError, on_one_line
 from mcstudy.files import parse_toml
+from mcstudy.studyfile.lines import with_line
 
 Study = TypeVar("Study")
 
@@ -38,7 +39,8 @@ def check_study(text: str, source: str, kinds: TypeAdapter[Study]) -> Study:
     try:
         return kinds.validate_python(table)
     except ValidationError as error:
-        raise UserError(f"{source}: {first_problem(error, table)}") from None
+        problem = with_line(first_problem(error, table), text)
+        raise UserError(f"{source}: {problem}") from None
 
 
 def first_problem(error: ValidationError, table: Mapping[str, Any]) -> str:

@@ -1,8 +1,12 @@
 """What the command line prints: on any terminal, of any text, whole."""
 
+import contextlib
 import os
+import pty
+import re
 import subprocess
 import sys
+import termios
 from pathlib import Path
 
 import pytest
@@ -67,3 +71,31 @@ def test_errors_in_the_c_locale() -> None:
 @pytest.mark.slow
 def test_the_c_locale() -> None:
     assert run("effects", **C_LOCALE).returncode == 0
+
+
+def on_terminal(columns: int, *arguments: str, **environment: str) -> str:
+    """Return what the command writes to a terminal of a width."""
+    leader, follower = pty.openpty()
+    termios.tcsetwinsize(follower, (40, columns))
+    kept = {key: value for key, value in os.environ.items() if key not in ("COLUMNS", "NO_COLOR")}
+    with subprocess.Popen(
+        [sys.executable, "-c", "from studies.cli import main; main()", *arguments],
+        env=kept | {"TERM": "xterm-256color", **environment}, stdout=follower, stderr=follower,
+    ) as process:  # fmt: skip
+        os.close(follower)
+        written = b""
+        with contextlib.suppress(OSError):
+            while piece := os.read(leader, 65536):
+                written += piece
+    os.close(leader)
+    assert process.returncode == 0, written
+    return written.decode("utf-8")
+
+
+def test_a_terminal_of_80_columns_and_no_colour() -> None:
+    text = on_terminal(80, "models", "planar", NO_COLOR="1")
+    assert "impact_speed" in text
+    # Neither foreground nor background colours.
+    assert not re.search(r"\x1b\[[0-9;]*(?:3|4|9|10)[0-9][;m]", text)
+    plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", text)
+    assert max(len(line) for line in plain.splitlines()) <= 80

@@ -1,19 +1,52 @@
 """Remake the README's figures from the nominal case, the full studies and the validation."""
 
 import shutil
+import tempfile
 from pathlib import Path
 
 from mcstudy.execution.results import ResultsFolder
+from models.protocol import Run
 from studies.api import run_case, run_study
 from studies.stiffness_fit.study import fit_stiffness_of
 from studies.validation.report import validate
+from studies.viewing import view_runs
 
 GALLERY = Path("results/gallery")
 
 
+INSTANT = 0.075
+"""s, the head's impact in the nominal run."""
+
+
+def draw_viewer(run: Run) -> None:
+    """Write the picture of a run in the viewer, by Playwright and a Chromium of the system.
+
+    Parameters
+    ----------
+    run : Run
+    """
+    from playwright.sync_api import sync_playwright
+
+    with tempfile.TemporaryDirectory() as scratch, sync_playwright() as driver:
+        page_file = Path(scratch) / "viewer.html"
+        page_file.write_text(view_runs("The nominal run", {"multibody": run}), encoding="utf-8")
+        browser = driver.chromium.launch(
+            executable_path=shutil.which("chromium"),
+            args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+        )
+        page = browser.new_page(viewport={"width": 1060, "height": 860})
+        page.goto(f"{page_file.as_uri()}#t={INSTANT}&curve=head acceleration [g]")
+        page.wait_for_selector("body[data-ready='1']")
+        page.wait_for_timeout(1000)
+        GALLERY.mkdir(parents=True, exist_ok=True)
+        page.screenshot(path=GALLERY / "viewer.png")
+        browser.close()
+
+
 def main() -> None:
     """Run the case and the study and copy the chosen figures to ``results/gallery``."""
-    _, _, case = run_case("configs/paper_case.toml")
+    run, _, case = run_case("configs/paper_case.toml")
+    draw_viewer(run)
     study = run_study("configs/paper_study.toml", quiet=False)
     drivers = run_study("configs/paper_sobol.toml", quiet=False)
     injuries = run_study("configs/paper_injury.toml", quiet=False)

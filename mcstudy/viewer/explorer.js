@@ -22,8 +22,9 @@ window.mcstudy.start(async (content) => {
     const j = seed % (k + 1), kept = order[k];
     order[k] = order[j]; order[j] = kept;
   }
-  const MOST_LINES = 1500, MOST_AXES = 7;
+  const MOST_LINES = 1500, MOST_AXES = 7, NARROW = 600, FEW_AXES = 3;
   const shown = () => columns.filter((column) => column.shown);
+  if (window.innerWidth < NARROW) shown().slice(FEW_AXES).forEach((column) => { column.shown = false; });
   let picked = -1, wanted = true, drag = null;
 
   function choose() {

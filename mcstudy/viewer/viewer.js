@@ -223,7 +223,9 @@ window.mcstudy.start(async (content) => {
   const VIEWS = { oblique: [3.2, -3.6, 2.2], side: [-0.2, -5.2, 0.9], above: [-0.6, -0.01, 6.0], front: [6.0, 0, 1.2] };
   function look() {
     const apart = byId("arrangement").value === "beside" ? content.runs.length - 1 : 0;
-    const from = VIEWS[byId("view").value].map((v) => v * (1 + 0.35 * apart));
+    // A narrow frame is looked into from farther away.
+    const away = (1 + 0.35 * apart) * Math.max(1, 1.2 / camera.aspect);
+    const from = VIEWS[byId("view").value].map((v) => v * away);
     content.runs.forEach((run) => fade(run, apart > 0));
     carried.set(0, 0, 0);
     target.set(-0.4, -0.5 * APART * apart, 0.6);

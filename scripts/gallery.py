@@ -32,7 +32,7 @@ def draw_viewer(run: Run) -> None:
         page_file.write_text(view_runs("The nominal run", {"multibody": run}), encoding="utf-8")
         browser = driver.chromium.launch(
             executable_path=shutil.which("chromium"),
-            args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+            args=["--no-sandbox", "--enable-unsafe-swiftshader"],
         )
         page = browser.new_page(viewport={"width": 1060, "height": 860})
         page.goto(f"{page_file.as_uri()}#t={INSTANT}&curve=head acceleration [g]")

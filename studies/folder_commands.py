@@ -70,6 +70,10 @@ def view(
     run: Annotated[
         list[int] | None, typer.Option(help="Number of a run to write as a page; may be repeated.")
     ] = None,
+    beside: Annotated[
+        list[Path] | None,
+        typer.Option(help="Another folder whose runs of these numbers are shown too."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="HTML file of --run; by default viewer.html in the folder.")
     ] = None,
@@ -93,8 +97,13 @@ def view(
     from studies import api
     from studies.viewing import view_runs
 
-    runs = {f"run {k}": api.rerun(results, k) for k in dict.fromkeys(run)}
-    page = view_runs(f"{folder.name}: {', '.join(runs)}", runs)
+    numbers = list(dict.fromkeys(run))
+    runs = {f"run {k}": api.rerun(results, k) for k in numbers}
+    title = f"{folder.name}: {', '.join(runs)}"
+    for other in beside or []:
+        held = ResultsFolder(other)
+        runs |= {f"{other.name}, run {k}": api.rerun(held, k) for k in numbers}
+    page = view_runs(title, runs)
     if not page:
         raise UserError(f"{folder}: the model of this study has no scene to view")
     target = out or folder / "viewer.html"

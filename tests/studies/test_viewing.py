@@ -55,6 +55,19 @@ def test_any_run_of_a_study_is_shown(crashes: Path, tmp_path: Path) -> None:
     assert 0.02 < events["head meets the car"] < events["landing"] < 3.0
 
 
+def test_the_same_run_of_two_studies_is_shown_together(crashes: Path, tmp_path: Path) -> None:
+    softer = CRASHES.replace("[design]", "[fixed]\nhood_stiffness = 0.0\n[design]")
+    (tmp_path / "s.toml").write_text(softer)
+    other = tmp_path / "softer"
+    assert mcstudy("run", tmp_path / "s.toml", "--out", other, "--workers", "1").code == 0
+    page = tmp_path / "both.html"
+    answer = mcstudy("view", crashes, "--run", "1", "--beside", other, "--out", page)
+    assert (answer.code, answer.err) == (0, "")
+    found = re.search(r'(?s)id="content">(.*?)</script>', page.read_text())
+    assert found is not None
+    assert [run["label"] for run in json.loads(found[1])["runs"]] == ["run 1", "softer, run 1"]
+
+
 def test_a_run_that_is_not_there_and_a_model_without_a_scene(crashes: Path, tmp_path: Path) -> None:
     assert "has no run 2, only 0 to 1" in told(mcstudy("view", crashes, "--run", "2"))
     folder = ResultsFolder(tmp_path / "headform")

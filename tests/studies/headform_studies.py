@@ -291,7 +291,10 @@ def told(answer: Answer, code: int = 2) -> str:
     return answer.err
 
 
-FRAME = r'<iframe title="[^"]*" loading="lazy" sandbox="allow-scripts" allow="fullscreen" srcdoc="([^"]*)">'
+FRAME = (
+    r'<iframe title="[^"]*" loading="lazy" sandbox="allow-scripts" allow="fullscreen" '
+    r'srcdoc="([^"]*)">'
+)
 
 
 def assert_stands_alone(html: str) -> None:

@@ -56,7 +56,7 @@ def test_any_run_of_a_study_is_shown(crashes: Path, tmp_path: Path) -> None:
 
 
 def test_the_same_run_of_two_studies_is_shown_together(crashes: Path, tmp_path: Path) -> None:
-    softer = CRASHES.replace("[design]", "[fixed]\nhood_stiffness = 0.0\n[design]")
+    softer = CRASHES.replace("[design]", "[fixed]\nhood_stiffness = { value = 0.0 }\n[design]")
     (tmp_path / "s.toml").write_text(softer)
     other = tmp_path / "softer"
     assert mcstudy("run", tmp_path / "s.toml", "--out", other, "--workers", "1").code == 0

@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from mcstudy.diagnosis.problem import Observation, Signal, Test
+from mcstudy.diagnosis.time_origin import time_shift
 
 Array = NDArray[np.float64]
 
 TIME_ORIGIN = 2e-4
 """s, standard deviation of a test's time origin (assumed: a few samples)."""
-TIME_ORIGIN_KNOWN = 2e-3
-"""s of shift between test and simulation from which a time origin counts as arbitrary."""
 MODES = 5
 """Smooth factors of the pulse from test to test: cosines over its duration."""
 PULSE = 0.02
@@ -384,16 +383,6 @@ def lay_out(test: Test, seen: Observation) -> Layout:
     time, values = time[recorded], values[recorded]
     large = np.flatnonzero(np.abs(values) >= PULSE * np.abs(values).max())
     window = (float(time[large[0]]), float(time[large[-1]]))
-    shift = _shift(signal.time, signal.values, time, values)
-    if abs(shift) < TIME_ORIGIN_KNOWN:
-        shift = 0.0
+    step = max(float(np.median(np.diff(signal.time))), BIN)
+    shift = time_shift(signal.time, signal.values, time, values, step)
     return Layout(test, shift, (window[0] + shift, window[1] + shift))
-
-
-def _shift(time: Array, values: Array, model_time: Array, model_values: Array) -> float:
-    """Return the delay (s) of a measured signal relative to a simulated one."""
-    step = max(float(np.median(np.diff(time))), BIN)
-    measured = np.interp(np.arange(time[0], time[-1], step), time, values)
-    model = np.interp(np.arange(model_time[0], model_time[-1], step), model_time, model_values)
-    lag = int(np.argmax(np.correlate(measured, model, mode="full"))) - (model.size - 1)
-    return float(time[0] + lag * step - model_time[0])

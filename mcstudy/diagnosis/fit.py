@@ -210,7 +210,7 @@ def fit(
     seen = observe_tests(problem, forms, layouts, scores)
     if seen is None:
         raise FitError("a run fails at the start of the fit")
-    misfit = _misfit(layouts, seen, scores, scatter, weight)
+    misfit = misfit_of(layouts, seen, scores, scatter, weight)
     slopes, fresh, simulated, stuck = known, False, known is None, False
     latest: Slopes | None = None
     if known is not None and known.shared[0].shape[1] < scores.shared.size:
@@ -316,13 +316,26 @@ def log_widening(layouts: Sequence[Layout], seen: Sequence[Observation]) -> floa
     )
 
 
-def _misfit(
+def misfit_of(
     layouts: Sequence[Layout],
     seen: Sequence[Observation],
     scores: Scores,
     scatter: Scatter,
     weight: float,
 ) -> float:
+    """Return the negative log posterior at latents.
+
+    Parameters
+    ----------
+    layouts : sequence of Layout
+    seen : sequence of Observation
+        Tests simulated there.
+    scores : Scores
+        Latents.
+    scatter : Scatter
+    weight : float
+        Weight of the data against the priors.
+    """
     total = float(scores.shared @ scores.shared)
     for layout, observation, own in zip(layouts, seen, scores.own, strict=True):
         residual = layout.residual(observation, own, scatter)
@@ -484,7 +497,7 @@ def _descend(
         )
         seen = observe_tests(problem, forms, layouts, trial)
         if seen is not None:
-            value = _misfit(layouts, seen, trial, scatter, weight)
+            value = misfit_of(layouts, seen, trial, scatter, weight)
             if value < misfit:
                 return trial, seen, value
         share *= 0.35

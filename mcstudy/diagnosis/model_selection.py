@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,12 @@ from mcstudy.diagnosis.screening import estimate_scatter, remaining
 from mcstudy.diagnosis.shortlist import shortlist
 from mcstudy.diagnosis.survey import (
     CLOSE,
+    Survey,
     approach,
     may_win,
     scan_scatter,
     survey,
+    temper,
     weight_of,
 )
 from mcstudy.diagnosis.templates import (
@@ -34,6 +37,7 @@ from mcstudy.diagnosis.templates import (
 from mcstudy.execution.workers import run_jobs
 
 Array = NDArray[np.float64]
+_Found = TypeVar("_Found", Survey, Fit)
 
 DISTINCT = 3.0
 """Log evidence within which causes are indistinguishable, and below which none is named."""
@@ -46,6 +50,8 @@ PRUNING_RATIO = 1.5
 FAR_BEHIND, HALF = 200.0, 0.5
 """Log units, and share of what the best form gains, by which a form may lie behind it before all
 are compared at one repeatability."""
+LITTLE = 0.1
+"""Share of what the best form gains that another one must gain to be fitted on."""
 MAX_CAUSES = 5
 """Causes, far from the data, of which all forms are fitted."""
 MIN_COUNT, MIN_DEAR = 6, 3
@@ -215,11 +221,16 @@ def rank_causes(
         for s in seen
         if s.far and s.form.cause in chosen and (s.form.cause, s.form.name) not in held
     ]
-    first = run_jobs(partial(approach, problem, layouts, base.forms), promising, workers)
+    tempered = run_jobs(partial(temper, problem, layouts, base.forms), promising, workers)
+    nearer = [s for s in tempered if s is not None]
+    if nearer and nearer[0].far:
+        nearer = _gaining(nearer, solve(centres[-1], centres[-1].residuals, nearer[0].weight)[1])
+    first = run_jobs(partial(approach, problem, layouts, base.forms), nearer, workers)
     reached = [found for found in first if found is not None]
     lowest = min((found.misfit for found in reached), default=0.0)
     # Forms far behind the best are pruned before their repeatability is re-estimated.
     kept = [found for found in reached if found.misfit < PRUNING_RATIO * lowest + CLOSE]
+    kept = _gaining(kept, solve(centres[-1], centres[-1].residuals, 1.0)[1])
     settled = run_jobs(partial(settle, problem, layouts), kept, workers)
     top = max([base, *settled], key=lambda fitted: fitted.log_evidence)
     behind = max(FAR_BEHIND, HALF * (top.log_evidence - base.log_evidence))
@@ -246,6 +257,21 @@ def rank_causes(
             )
         )
     return sorted(candidates, key=lambda candidate: -candidate.log_evidence)
+
+
+def _gaining(found: Sequence[_Found], without: float) -> list[_Found]:
+    """Return those that gain a share of what the best one does; all where little is gained.
+
+    Parameters
+    ----------
+    found : sequence of Survey or of Fit
+        With their misfits.
+    without : float
+        Misfit without any of them.
+    """
+    best = min((entry.misfit for entry in found), default=0.0)
+    behind = max(CLOSE, (1.0 - LITTLE) * (without - best))
+    return [entry for entry in found if entry.misfit <= best + behind]
 
 
 def examine(problem: Problem, layouts: Sequence[Layout], extended: Fit, gained: float) -> Remainder:

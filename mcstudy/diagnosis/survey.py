@@ -6,7 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.fit import Fit, FitError, Slopes, fit, log_widening, observe_tests
+from mcstudy.diagnosis.fit import (
+    Fit,
+    FitError,
+    Slopes,
+    fit,
+    log_widening,
+    misfit_of,
+    observe_tests,
+)
 from mcstudy.diagnosis.layout import Layout, Scatter
 from mcstudy.diagnosis.linear_model import Centre, solve
 from mcstudy.diagnosis.normal_equations import Scores
@@ -131,13 +139,13 @@ def survey(
         # Near the data the better of the points is enough.
         k = int(np.argmin(misfits))
         few, centres = [few[k]], [centres[k]]
-    best: list[tuple[float, Scores, Slopes]] = []
+    best: list[tuple[float, Scores, Scores, Slopes]] = []
     changes = 0.0
     lowest = expected = np.inf
     for centre, whole in zip(few, centres, strict=True):
         without = solve(centre, centre.residuals, weight)[1]
         lowest = min(lowest, without)
-        tried: list[tuple[float, Scores]] = []
+        tried: list[tuple[float, Scores, Scores]] = []
         for scores in score_grid(form, fine=weight < FAR):
             start = Scores(np.concatenate([centre.scores.shared, scores]), centre.scores.own)
             seen = observe_tests(part, (*forms, form), places, start)
@@ -162,19 +170,44 @@ def survey(
                 own[i] = z
             held = tuple(np.clip(z, -MAX_START, MAX_START) for z in own)
             cost = misfit + 0.5 * float(scores @ scores) / times
-            tried.append((cost, Scores(np.concatenate([shared, scores]), held)))
+            moved = Scores(np.concatenate([shared, scores]), held)
+            tried.append((cost, moved, Scores(start.shared, whole.scores.own)))
         if tried:
             best.append((*min(tried, key=lambda entry: entry[0]), whole.slopes))
     if changes < UNSEEN:
         return None
     best.sort(key=lambda entry: entry[0])
     starts = tuple(
-        (start, slopes) for cost, start, slopes in best if cost < RIVAL_START * best[0][0]
+        (_better(problem, layouts, (*forms, form), scatter, weight, moved, still), slopes)
+        for cost, moved, still, slopes in best
+        if cost < RIVAL_START * best[0][0]
     )
     # Steps of the grid are too large for a small effect in data of little noise.
     reached = min(best[0][0], expected) if weight >= FAR else best[0][0]
     promise = max(lowest - expected, 0.0)
     return Survey(form, scatter, weight, times * reached, times * promise, starts)
+
+
+def _better(
+    problem: Problem,
+    layouts: Sequence[Layout],
+    forms: tuple[Form, ...],
+    scatter: Scatter,
+    weight: float,
+    moved: Scores,
+    still: Scores,
+) -> Scores:
+    """Return the latents moved by the linear model, or those before where it leads astray.
+
+    It does where a parameter lies near the end of its range, or the move is a long one.
+    """
+    found = []
+    for scores in (moved, still):
+        seen = observe_tests(problem, forms, layouts, scores)
+        found.append(
+            np.inf if seen is None else misfit_of(layouts, seen, scores, scatter, weight)
+        )
+    return moved if found[0] <= found[1] else still
 
 
 def _spread(layouts: Sequence[Layout]) -> list[int]:
@@ -196,12 +229,12 @@ def may_win(surveyed: Survey, misfit: float, promise: float) -> bool:
     return MODEST * surveyed.promise + SLIGHT > promise
 
 
-def approach(
+def temper(
     problem: Problem, layouts: Sequence[Layout], forms: tuple[Form, ...], surveyed: Survey
-) -> Fit | None:
-    """Return a first fit of a model extended by one form; None if it cannot run.
+) -> Survey | None:
+    """Return a survey whose starts have been refitted to tempered data, where they lie far away.
 
-    From far away the likelihood is tempered, and less so as the fit comes near.
+    Its misfit is that of the best of them; None if none can run.
 
     Parameters
     ----------
@@ -213,18 +246,52 @@ def approach(
     surveyed : Survey
         Prior grid scan of the form to add.
     """
+    if not surveyed.far:
+        return surveyed
+    found = []
+    for start, slopes in surveyed.starts:
+        try:
+            fitted = fit(
+                problem, layouts, (*forms, surveyed.form), start, surveyed.scatter, slopes,
+                exact=False, weight=surveyed.weight, most=STAGE_STEPS,
+            )  # fmt: skip
+        except FitError:
+            continue
+        found.append((fitted.misfit, _without_nuisances(fitted), fitted.slopes))
+    if not found:
+        return None
+    found.sort(key=lambda entry: entry[0])
+    starts = tuple((start, slopes) for _, start, slopes in found)
+    return replace(surveyed, misfit=found[0][0], starts=starts)
+
+
+def approach(
+    problem: Problem, layouts: Sequence[Layout], forms: tuple[Form, ...], surveyed: Survey
+) -> Fit | None:
+    """Return a first fit of a model extended by one form; None if it cannot run.
+
+    Far from the data the likelihood is tempered less and less as the fit comes near.
+
+    Parameters
+    ----------
+    problem : Problem
+    layouts : sequence of Layout
+        Of the tests.
+    forms : tuple of Form
+        Forms of the model without the one to add.
+    surveyed : Survey
+        Of the form to add, after ``temper``.
+    """
     forms = (*forms, surveyed.form)
     best: Fit | None = None
     for start, slopes in surveyed.starts:
         try:
-            for stage in (surveyed.weight, np.sqrt(surveyed.weight)) if surveyed.far else ():
+            if surveyed.far:
                 found = fit(
                     problem, layouts, forms, start, surveyed.scatter, slopes,
-                    exact=False, weight=stage, most=STAGE_STEPS,
+                    exact=False, weight=float(np.sqrt(surveyed.weight)), most=STAGE_STEPS,
                 )  # fmt: skip
-                slopes = found.slopes
-                # Nuisances absorbed the misfit of wrong shared values: they are reset.
-                start = Scores(found.scores.shared, tuple(np.zeros_like(z) for z in start.own))
+                start, slopes = _without_nuisances(found), found.slopes
             found = fit(
                 problem, layouts, forms, start, surveyed.scatter, slopes,
                 exact=False, most=STAGE_STEPS,
@@ -234,3 +301,8 @@ def approach(
         if best is None or found.log_evidence > best.log_evidence:
             best = found
     return best
+
+
+def _without_nuisances(found: Fit) -> Scores:
+    """Return the shared latents of a fit; nuisances absorbed the misfit of wrong ones."""
+    return Scores(found.scores.shared, tuple(np.zeros_like(z) for z in found.scores.own))

@@ -23,7 +23,8 @@ SHARED_STEP, OWN_STEP = 0.05, 0.5
 CHANGE, STEP_RANGE = 30.0, (0.01, 0.3)
 """Norm of the whitened change of the data over which a shared value is differentiated once its
 column is known, and bounds of the step."""
-MAX_STEPS = 12
+MAX_STEPS, MAX_EXACT = 12, 30
+"""Steps of a fit, and of an exact one: along confounded values it comes near slowly."""
 CONVERGED = 0.05
 """Expected gain in log posterior below which a fit has converged."""
 NEAR, MIN_SLIDE = 2.0, 0.3
@@ -33,6 +34,9 @@ LINEAR = 0.7
 """Achieved share of the expected gain above which the Jacobian is reused."""
 LONGEST = 1.5
 """Largest move of a shared latent in one step."""
+TRIES, BOUNDED, SHORTER = 6, 4, 0.35
+"""Moves that are tried in a step, those of them that are bounded in length, and the ratio of the
+lengths of one and the next."""
 
 
 @dataclass(frozen=True)
@@ -177,7 +181,7 @@ def fit(
     *,
     exact: bool = True,
     weight: float = 1.0,
-    most: int = MAX_STEPS,
+    most: int | None = None,
 ) -> Fit:
     """Return the maximum a posteriori fit near a start.
 
@@ -197,8 +201,8 @@ def fit(
     weight : float
         Weight of the data against the priors; below 1 it tempers the likelihood, so that a fit from
         far away does not end in a wrong local optimum.
-    most : int
-        Largest number of steps.
+    most : int, optional
+        Largest number of steps, by default ``MAX_STEPS``, or ``MAX_EXACT`` of an exact fit.
 
     Raises
     ------
@@ -206,6 +210,8 @@ def fit(
         If a run fails at the start.
     """
     forms = tuple(forms)
+    if most is None:
+        most = MAX_EXACT if exact else MAX_STEPS
     scores = start
     seen = observe_tests(problem, forms, layouts, scores)
     if seen is None:
@@ -234,7 +240,7 @@ def fit(
             stuck = slide.expected_gain < MIN_SLIDE
             if not stuck:
                 better = _descend(
-                    problem, forms, layouts, scores, slide.move, scatter, misfit, weight
+                    problem, forms, layouts, scores, _shares(slide.move), scatter, misfit, weight
                 )
                 stuck = better is None or misfit - better[2] < CONVERGED
             if better is not None:
@@ -244,10 +250,12 @@ def fit(
         promising = planned.expected_gain >= CONVERGED
         if promising and not last:
             better = _descend(
-                problem, forms, layouts, scores, planned.move, scatter, misfit, weight
-            )
+                problem, forms, layouts, scores, _shorter(system, planned.move), scatter, misfit,
+                weight,
+            )  # fmt: skip
         if better is None:
-            if fresh or last or not (exact or (promising and not simulated)):
+            wanted = exact or planned.expected_gain >= NEAR or (promising and not simulated)
+            if fresh or last or not wanted:
                 break
             slopes = None
             continue
@@ -477,28 +485,53 @@ def _doubtful(
     return tuple(tables)
 
 
+def _shares(move: Scores) -> Iterator[Scores]:
+    """Yield shorter and shorter shares of a move."""
+    longest = float(np.abs(move.shared).max(initial=0.0))
+    share = min(1.0, LONGEST / longest) if longest > 0.0 else 1.0
+    for _ in range(TRIES):
+        yield _scaled(move, share)
+        share *= SHORTER
+
+
+def _shorter(system: NormalEquations, move: Scores) -> Iterator[Scores]:
+    """Yield moves within shorter and shorter lengths, the last ones shares of the shortest."""
+    longest = min(LONGEST, float(np.abs(move.shared).max(initial=0.0)))
+    held = move
+    for k in range(TRIES):
+        if k < BOUNDED:
+            held = system.within(move, longest * SHORTER**k)
+            yield held
+        else:
+            yield _scaled(held, SHORTER ** (k + 1 - BOUNDED))
+
+
+def _scaled(move: Scores, share: float) -> Scores:
+    return Scores(share * move.shared, tuple(share * z for z in move.own))
+
+
 def _descend(
     problem: Problem,
     forms: Sequence[Form],
     layouts: Sequence[Layout],
     scores: Scores,
-    move: Scores,
+    moves: Iterator[Scores],
     scatter: Scatter,
     misfit: float,
     weight: float,
 ) -> tuple[Scores, list[Observation], float] | None:
-    """Return more probable latents along the step, their simulated tests and log posterior."""
-    longest = float(np.abs(move.shared).max(initial=0.0))
-    share = min(1.0, LONGEST / longest) if longest > 0.0 else 1.0
-    for _ in range(6):
+    """Return more probable latents after the first of the moves that improves, or None.
+
+    With the simulated tests there and the negative log posterior.
+    """
+    for move in moves:
         trial = Scores(
-            np.clip(scores.shared + share * move.shared, -MAX_SCORE, MAX_SCORE),
-            tuple(z + share * d for z, d in zip(scores.own, move.own, strict=True)),
+            np.clip(scores.shared + move.shared, -MAX_SCORE, MAX_SCORE),
+            tuple(z + d for z, d in zip(scores.own, move.own, strict=True)),
         )
         seen = observe_tests(problem, forms, layouts, trial)
         if seen is not None:
             value = misfit_of(layouts, seen, trial, scatter, weight)
             if value < misfit:
                 return trial, seen, value
-        share *= 0.35
     return None

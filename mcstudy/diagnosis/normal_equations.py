@@ -11,6 +11,8 @@ Array = NDArray[np.float64]
 FLAT = 1e-3
 """Information in a direction of the shared latents, over the largest one, below which the direction
 counts as unknown to the data."""
+BISECTIONS = 20
+"""Bisections of the damping of a move that is too long."""
 
 
 @dataclass(frozen=True)
@@ -119,3 +121,40 @@ class NormalEquations:
             for solved, inverse, cross in zip(first, self._inverses, self._crosses, strict=True)
         )
         return Step(Scores(shared, own), 0.5 * (gain + float(right @ shared)))
+
+    def within(self, move: Scores, longest: float) -> Scores:
+        """Return the most probable move whose shared part has no component beyond a length.
+
+        Where the data know a direction badly the linear model makes long moves along it. These are
+        cut first (D. Marquardt, J. Soc. Ind. Appl. Math. 11, 1963), not all directions alike.
+
+        Parameters
+        ----------
+        move : Scores
+            Move without a limit, from ``solve``.
+        longest : float
+            Largest size of a component.
+        """
+        values, vectors = np.linalg.eigh(self.schur)
+        pull = values * (vectors.T @ move.shared)
+
+        def shortened(damping: float) -> Array:
+            return np.asarray(vectors @ (pull / (values + damping)))
+
+        def size(damping: float) -> float:
+            return float(np.abs(shortened(damping)).max(initial=0.0))
+
+        if size(0.0) <= longest:
+            return move
+        low, high = 0.0, float(values[-1])
+        while size(high) > longest:
+            low, high = high, 10.0 * high
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if size(middle) > longest else (low, middle)
+        shared = shortened(high)
+        own = tuple(
+            z + inverse @ (cross @ (move.shared - shared))
+            for z, inverse, cross in zip(move.own, self._inverses, self._crosses, strict=True)
+        )
+        return Scores(shared, own)

@@ -227,12 +227,13 @@ def rank_causes(
     nearer = [s for s in tempered if s is not None]
     if nearer and nearer[0].far:
         nearer = _gaining(nearer, solve(centres[-1], centres[-1].residuals, nearer[0].weight)[1])
-    first = run_jobs(partial(approach, problem, layouts, base.forms), nearer, workers)
+    without = solve(centres[-1], centres[-1].residuals, 1.0)[1]
+    first = run_jobs(partial(approach, problem, layouts, base.forms, without), nearer, workers)
     reached = [found for found in first if found is not None]
     lowest = min((found.misfit for found in reached), default=0.0)
     # Forms far behind the best are pruned before their repeatability is re-estimated.
     kept = [found for found in reached if found.misfit < PRUNING_RATIO * lowest + CLOSE]
-    kept = _gaining(kept, solve(centres[-1], centres[-1].residuals, 1.0)[1])
+    kept = _gaining(kept, without)
     settled = run_jobs(partial(settle, problem, layouts), kept, workers)
     top = max([base, *settled], key=lambda fitted: fitted.log_evidence)
     # What a fit from far away still left was taken for repeatability.

@@ -41,6 +41,8 @@ MODEST, SLIGHT = 4.0, 6.0
 """Factor and log units by which a form near the data may promise less gain than the best."""
 RIVAL_START = 1.5
 """Factor on the misfit of the best start within which another one is tried too."""
+SPARE = 2
+"""Further starts of a form, for a fit that ends worse than the model without it."""
 STAGE_STEPS = 6
 """Steps of a first fit."""
 SURVEYED = 10
@@ -74,6 +76,16 @@ def weight_of(samples: int, misfit: float) -> float:
 
 
 @dataclass(frozen=True)
+class _Trial:
+    """Latents that a fit may start from: as moved by the linear model, and before."""
+
+    cost: float
+    moved: Scores
+    still: Scores
+    slopes: Slopes
+
+
+@dataclass(frozen=True)
 class Survey:
     """Result of a prior grid scan of a form.
 
@@ -85,6 +97,7 @@ class Survey:
     misfit : negative log posterior at the best start, or what the expected gain makes of it.
     promise : expected gain in log posterior if only the size of the form were free.
     starts : latents to start from, with nearby Jacobians, best first.
+    spare : others, for a fit that ends worse than the model without the form.
     """
 
     form: Form
@@ -93,6 +106,7 @@ class Survey:
     misfit: float
     promise: float
     starts: tuple[tuple[Scores, Slopes], ...]
+    spare: tuple[_Trial, ...] = ()
 
     @property
     def far(self) -> bool:
@@ -139,13 +153,14 @@ def survey(
         # Near the data the better of the points is enough.
         k = int(np.argmin(misfits))
         few, centres = [few[k]], [centres[k]]
-    best: list[tuple[float, Scores, Scores, Slopes]] = []
+    best: list[_Trial] = []
+    rest: list[_Trial] = []
     changes = 0.0
     lowest = expected = np.inf
     for centre, whole in zip(few, centres, strict=True):
         without = solve(centre, centre.residuals, weight)[1]
         lowest = min(lowest, without)
-        tried: list[tuple[float, Scores, Scores]] = []
+        tried: dict[float, _Trial] = {}
         for scores in score_grid(form, fine=weight < FAR):
             start = Scores(np.concatenate([centre.scores.shared, scores]), centre.scores.own)
             seen = observe_tests(part, (*forms, form), places, start)
@@ -171,21 +186,28 @@ def survey(
             held = tuple(np.clip(z, -MAX_START, MAX_START) for z in own)
             cost = misfit + 0.5 * float(scores @ scores) / times
             moved = Scores(np.concatenate([shared, scores]), held)
-            tried.append((cost, moved, Scores(start.shared, whole.scores.own)))
-        if tried:
-            best.append((*min(tried, key=lambda entry: entry[0]), whole.slopes))
+            still = Scores(start.shared, whole.scores.own)
+            # One start a value of the first parameter, where or when the cause sets in.
+            place = float(scores[0]) if scores.size else 0.0
+            if place not in tried or cost < tried[place].cost:
+                tried[place] = _Trial(cost, moved, still, whole.slopes)
+        ranked = sorted(tried.values(), key=lambda entry: entry.cost)
+        best += ranked[:1]
+        rest += ranked[1:]
     if changes < UNSEEN:
         return None
-    best.sort(key=lambda entry: entry[0])
+    best.sort(key=lambda entry: entry.cost)
+    rest.sort(key=lambda entry: entry.cost)
     starts = tuple(
-        (_better(problem, layouts, (*forms, form), scatter, weight, moved, still), slopes)
-        for cost, moved, still, slopes in best
-        if cost < RIVAL_START * best[0][0]
+        _better(problem, layouts, (*forms, form), scatter, weight, entry)
+        for entry in best
+        if entry.cost < RIVAL_START * best[0].cost
     )
     # Steps of the grid are too large for a small effect in data of little noise.
-    reached = min(best[0][0], expected) if weight >= FAR else best[0][0]
+    reached = min(best[0].cost, expected) if weight >= FAR else best[0].cost
     promise = max(lowest - expected, 0.0)
-    return Survey(form, scatter, weight, times * reached, times * promise, starts)
+    spare = tuple(rest[:SPARE])
+    return Survey(form, scatter, weight, times * reached, times * promise, starts, spare)
 
 
 def _better(
@@ -194,20 +216,17 @@ def _better(
     forms: tuple[Form, ...],
     scatter: Scatter,
     weight: float,
-    moved: Scores,
-    still: Scores,
-) -> Scores:
+    tried: _Trial,
+) -> tuple[Scores, Slopes]:
     """Return the latents moved by the linear model, or those before where it leads astray.
 
     It does where a parameter lies near the end of its range, or the move is a long one.
     """
     found = []
-    for scores in (moved, still):
+    for scores in (tried.moved, tried.still):
         seen = observe_tests(problem, forms, layouts, scores)
-        found.append(
-            np.inf if seen is None else misfit_of(layouts, seen, scores, scatter, weight)
-        )
-    return moved if found[0] <= found[1] else still
+        found.append(np.inf if seen is None else misfit_of(layouts, seen, scores, scatter, weight))
+    return (tried.moved if found[0] <= found[1] else tried.still), tried.slopes
 
 
 def _spread(layouts: Sequence[Layout]) -> list[int]:
@@ -266,7 +285,11 @@ def temper(
 
 
 def approach(
-    problem: Problem, layouts: Sequence[Layout], forms: tuple[Form, ...], surveyed: Survey
+    problem: Problem,
+    layouts: Sequence[Layout],
+    forms: tuple[Form, ...],
+    without: float,
+    surveyed: Survey,
 ) -> Fit | None:
     """Return a first fit of a model extended by one form; None if it cannot run.
 
@@ -279,28 +302,49 @@ def approach(
         Of the tests.
     forms : tuple of Form
         Forms of the model without the one to add.
+    without : float
+        Misfit of the model without it.
     surveyed : Survey
         Of the form to add, after ``temper``.
     """
     forms = (*forms, surveyed.form)
     best: Fit | None = None
     for start, slopes in surveyed.starts:
-        try:
-            if surveyed.far:
-                found = fit(
-                    problem, layouts, forms, start, surveyed.scatter, slopes,
-                    exact=False, weight=float(np.sqrt(surveyed.weight)), most=STAGE_STEPS,
-                )  # fmt: skip
-                start, slopes = _without_nuisances(found), found.slopes
-            found = fit(
-                problem, layouts, forms, start, surveyed.scatter, slopes,
-                exact=False, most=STAGE_STEPS,
-            )  # fmt: skip
-        except FitError:
-            continue
-        if best is None or found.log_evidence > best.log_evidence:
+        found = _come_near(problem, layouts, forms, surveyed, start, slopes)
+        if found is not None and (best is None or found.log_evidence > best.log_evidence):
+            best = found
+    for tried in surveyed.spare:
+        if best is not None and best.misfit <= without:
+            break
+        start, slopes = _better(problem, layouts, forms, surveyed.scatter, surveyed.weight, tried)
+        found = _come_near(problem, layouts, forms, surveyed, start, slopes)
+        if found is not None and (best is None or found.log_evidence > best.log_evidence):
             best = found
     return best
+
+
+def _come_near(
+    problem: Problem,
+    layouts: Sequence[Layout],
+    forms: tuple[Form, ...],
+    surveyed: Survey,
+    start: Scores,
+    slopes: Slopes,
+) -> Fit | None:
+    """Return a first fit from a start, or None if it cannot run."""
+    try:
+        if surveyed.far:
+            found = fit(
+                problem, layouts, forms, start, surveyed.scatter, slopes,
+                exact=False, weight=float(np.sqrt(surveyed.weight)), most=STAGE_STEPS,
+            )  # fmt: skip
+            start, slopes = _without_nuisances(found), found.slopes
+        return fit(
+            problem, layouts, forms, start, surveyed.scatter, slopes,
+            exact=False, most=STAGE_STEPS,
+        )  # fmt: skip
+    except FitError:
+        return None
 
 
 def _without_nuisances(found: Fit) -> Scores:

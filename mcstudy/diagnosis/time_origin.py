@@ -50,9 +50,7 @@ def _rise(time: Array, values: Array, level: float) -> float:
     return float(np.interp(level, size[k : k + 2], time[k : k + 2]))
 
 
-def _lag(
-    time: Array, values: Array, model_time: Array, model_values: Array, step: float
-) -> float:
+def _lag(time: Array, values: Array, model_time: Array, model_values: Array, step: float) -> float:
     """Return the delay (s) at which the two pulses correlate best."""
     measured = np.interp(np.arange(time[0], time[-1], step), time, values)
     model = np.interp(np.arange(model_time[0], model_time[-1], step), model_time, model_values)

@@ -260,10 +260,12 @@ def _judge(
         and not _trace(problem, causes, empty.layouts, best.fitted, workers)
     ):
         return alone
-    found = None
+    found, share = None, left.share
     if left.share >= HOPELESS:
         tell(f"looking for a second cause beside {best.cause.name}")
-        found = _best_pair(problem, causes, empty, candidates, left, workers)
+        found, added = _best_pair(problem, causes, empty, candidates, left, workers)
+        # The repeatability takes part of what is left; a second cause may show that it did.
+        share = min(share, best.log_evidence / (best.log_evidence + max(added, 0.0)))
     if found is not None:
         pair, rest, firsts = found
         explained = rest.p_value >= STRUCTURE
@@ -286,7 +288,7 @@ def _judge(
         )
     if clean:
         return alone
-    if left.share >= MAX_SHARE:
+    if share >= MAX_SHARE:
         return flagged
     return replace(nothing, remainder=left, why="structure remains beside the best cause")
 
@@ -357,10 +359,11 @@ def _best_pair(
     candidates: Sequence[Candidate],
     alone: Remainder,
     workers: int,
-) -> tuple[_Pair, Remainder, tuple[str, ...]] | None:
+) -> tuple[tuple[_Pair, Remainder, tuple[str, ...]] | None, float]:
     """Return the pair of causes that explains the misfit, None if no second cause is warranted.
 
-    With its remaining structure, and first causes that do equally well with the same second one.
+    With its remaining structure, and first causes that do equally well with the same second one;
+    and what the best second cause adds to the log evidence, warranted or not.
 
     Parameters
     ----------
@@ -375,11 +378,11 @@ def _best_pair(
         if seconds:
             pairs.append(_Pair(first, seconds))
     if not pairs:
-        return None
+        return None, 0.0
     best = max(pairs, key=lambda pair: pair.log_evidence)
-    if len(_near(best.seconds)) > MAX_SECONDS:
-        return None
     added, sole = best.seconds[0].log_evidence, best.first.log_evidence
+    if len(_near(best.seconds)) > MAX_SECONDS:
+        return None, added
     left = examine(problem, empty.layouts, best.seconds[0].fitted, sole + added)
     if left.p_value >= STRUCTURE:
         small = FAINT_SHARE * sole if alone.p_value >= STRUCTURE else ENOUGH * alone.left
@@ -387,7 +390,8 @@ def _best_pair(
     else:
         enough = left.share >= NEARLY_ALL and added >= NOTABLE * sole
     if not enough:
-        return None
+        return None, added
     limit = best.log_evidence - DISTINCT
     alike = [p for p in pairs if p.second == best.second and p.log_evidence > limit]
-    return best, left, tuple(p.first.cause.name for p in alike) if len(alike) > 1 else ()
+    firsts = tuple(p.first.cause.name for p in alike) if len(alike) > 1 else ()
+    return (best, left, firsts), added

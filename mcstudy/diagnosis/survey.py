@@ -42,7 +42,9 @@ MODEST, SLIGHT = 4.0, 6.0
 RIVAL_START = 1.5
 """Factor on the misfit of the best start within which another one is tried too."""
 SPARE = 2
-"""Further starts of a form, for a fit that ends worse than the model without it."""
+"""Further starts of a form whose fit falls short of what it promises."""
+KEPT = 0.5
+"""Share of the expected gain below which a fit falls short of it."""
 STAGE_STEPS = 6
 """Steps of a first fit."""
 SURVEYED = 10
@@ -97,7 +99,7 @@ class Survey:
     misfit : negative log posterior at the best start, or what the expected gain makes of it.
     promise : expected gain in log posterior if only the size of the form were free.
     starts : latents to start from, with nearby Jacobians, best first.
-    spare : others, for a fit that ends worse than the model without the form.
+    spare : others, for a fit that falls short of the promise.
     """
 
     form: Form
@@ -313,8 +315,9 @@ def approach(
         found = _come_near(problem, layouts, forms, surveyed, start, slopes)
         if found is not None and (best is None or found.log_evidence > best.log_evidence):
             best = found
-    for tried in surveyed.spare:
-        if best is not None and best.misfit <= without:
+    enough = without - KEPT * surveyed.promise
+    for tried in () if surveyed.far else surveyed.spare:
+        if best is not None and best.misfit <= enough:
             break
         start, slopes = _better(problem, layouts, forms, surveyed.scatter, surveyed.weight, tried)
         found = _come_near(problem, layouts, forms, surveyed, start, slopes)

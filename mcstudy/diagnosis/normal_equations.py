@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 FLAT = 1e-3
 """Information in a direction of the shared latents, over the largest one, below which the direction
 counts as unknown to the data."""
-BISECTIONS = 20
+BISECTIONS = 40
 """Bisections of the damping of a move that is too long."""
 
 

@@ -263,9 +263,9 @@ def _judge(
     found, share = None, left.share
     if left.share >= HOPELESS:
         tell(f"looking for a second cause beside {best.cause.name}")
-        found, added = _best_pair(problem, causes, empty, candidates, left, workers)
+        found, beyond = _best_pair(problem, causes, empty, candidates, left, workers)
         # The repeatability takes part of what is left; a second cause may show that it did.
-        share = min(share, best.log_evidence / (best.log_evidence + max(added, 0.0)))
+        share = min(share, best.log_evidence / (best.log_evidence + max(beyond, 0.0)))
     if found is not None:
         pair, rest, firsts = found
         explained = rest.p_value >= STRUCTURE
@@ -363,7 +363,7 @@ def _best_pair(
     """Return the pair of causes that explains the misfit, None if no second cause is warranted.
 
     With its remaining structure, and first causes that do equally well with the same second one;
-    and what the best second cause adds to the log evidence, warranted or not.
+    and the log evidence of the best pair beyond that of the first cause, warranted or not.
 
     Parameters
     ----------
@@ -381,8 +381,9 @@ def _best_pair(
         return None, 0.0
     best = max(pairs, key=lambda pair: pair.log_evidence)
     added, sole = best.seconds[0].log_evidence, best.first.log_evidence
+    beyond = best.log_evidence - candidates[0].log_evidence
     if len(_near(best.seconds)) > MAX_SECONDS:
-        return None, added
+        return None, beyond
     left = examine(problem, empty.layouts, best.seconds[0].fitted, sole + added)
     if left.p_value >= STRUCTURE:
         small = FAINT_SHARE * sole if alone.p_value >= STRUCTURE else ENOUGH * alone.left
@@ -390,8 +391,8 @@ def _best_pair(
     else:
         enough = left.share >= NEARLY_ALL and added >= NOTABLE * sole
     if not enough:
-        return None, added
+        return None, beyond
     limit = best.log_evidence - DISTINCT
     alike = [p for p in pairs if p.second == best.second and p.log_evidence > limit]
     firsts = tuple(p.first.cause.name for p in alike) if len(alike) > 1 else ()
-    return (best, left, firsts), added
+    return (best, left, firsts), beyond

@@ -17,6 +17,8 @@ from mcstudy.diagnosis.screening import estimate_scatter, remaining
 from mcstudy.diagnosis.shortlist import shortlist
 from mcstudy.diagnosis.survey import (
     CLOSE,
+    MODEST,
+    SLIGHT,
     approach,
     may_win,
     scan_scatter,
@@ -46,6 +48,9 @@ PRUNING_RATIO = 1.5
 FAR_BEHIND, HALF = 200.0, 0.5
 """Log units, and share of what the best form gains, by which a form may lie behind it before all
 are compared at one repeatability."""
+BEHIND_DEAR = 30.0
+"""The same log units where runs are dear: each form has its own most probable repeatability by
+then, so that another one hardly takes it nearer to the best."""
 MAX_CAUSES = 5
 """Causes, far from the data, of which all forms are fitted."""
 MIN_COUNT, MIN_DEAR = 6, 3
@@ -161,6 +166,7 @@ def rank_causes(
     workers: int,
     most: int,
     bank: Sequence[Template] | None = None,
+    needed: float = 0.0,
 ) -> list[Candidate]:
     """Return the causes by evidence above a base's, best first.
 
@@ -183,6 +189,9 @@ def rank_causes(
         Largest number of forms that are refitted, the most promising ones.
     bank : sequence of Template, optional
         Templates of the causes about the base, where they are known.
+    needed : float
+        Log evidence that a cause must add. Where runs are dear and no form near the data promises
+        it, none is fitted.
     """
     unknowns = len(problem.unknowns)
     shared = base.scores.shared.copy()
@@ -203,6 +212,8 @@ def rank_causes(
     scans = run_jobs(partial(survey, problem, layouts, base.forms, centres, scan), forms, workers)
     seen = sorted((s for s in scans if s is not None), key=lambda s: s.misfit)
     best = max((s.promise for s in seen), default=0.0)
+    if problem.dear and not any(s.far or MODEST * s.promise + SLIGHT > needed for s in seen):
+        return []
     least = MIN_DEAR if problem.dear else MIN_COUNT
     promising = [
         s for k, s in enumerate(seen[:most]) if k < least or may_win(s, seen[0].misfit, best)
@@ -222,7 +233,8 @@ def rank_causes(
     kept = [found for found in reached if found.misfit < PRUNING_RATIO * lowest + CLOSE]
     settled = run_jobs(partial(settle, problem, layouts), kept, workers)
     top = max([base, *settled], key=lambda fitted: fitted.log_evidence)
-    behind = max(FAR_BEHIND, HALF * (top.log_evidence - base.log_evidence))
+    least_behind = BEHIND_DEAR if problem.dear else FAR_BEHIND
+    behind = max(least_behind, HALF * (top.log_evidence - base.log_evidence))
     ahead = [found for found in settled if found.log_evidence > top.log_evidence - behind]
     refit = partial(with_given_scatter, problem, layouts, top.scatter, exact=True)
     base, *fits = run_jobs(refit, [base, *ahead], workers)

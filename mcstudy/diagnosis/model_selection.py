@@ -17,8 +17,6 @@ from mcstudy.diagnosis.screening import estimate_scatter, remaining
 from mcstudy.diagnosis.shortlist import shortlist
 from mcstudy.diagnosis.survey import (
     CLOSE,
-    MODEST,
-    SLIGHT,
     approach,
     may_win,
     scan_scatter,
@@ -48,6 +46,8 @@ PRUNING_RATIO = 1.5
 FAR_BEHIND, HALF = 200.0, 0.5
 """Log units, and share of what the best form gains, by which a form may lie behind it before all
 are compared at one repeatability."""
+KEPT = 2.0
+"""Factor by which a form near the data may add more than it promises."""
 BEHIND_DEAR = 30.0
 """The same log units where runs are dear: each form has its own most probable repeatability by
 then, so that another one hardly takes it nearer to the best."""
@@ -190,8 +190,8 @@ def rank_causes(
     bank : sequence of Template, optional
         Templates of the causes about the base, where they are known.
     needed : float
-        Log evidence that a cause must add. Where runs are dear and no form near the data promises
-        it, none is fitted.
+        Log evidence that a cause must add. Where runs are dear, forms near the data that promise
+        far less are not fitted.
     """
     unknowns = len(problem.unknowns)
     shared = base.scores.shared.copy()
@@ -212,8 +212,8 @@ def rank_causes(
     scans = run_jobs(partial(survey, problem, layouts, base.forms, centres, scan), forms, workers)
     seen = sorted((s for s in scans if s is not None), key=lambda s: s.misfit)
     best = max((s.promise for s in seen), default=0.0)
-    if problem.dear and not any(s.far or MODEST * s.promise + SLIGHT > needed for s in seen):
-        return []
+    if problem.dear and needed > 0.0:
+        seen = [s for s in seen if s.far or KEPT * s.promise > needed]
     least = MIN_DEAR if problem.dear else MIN_COUNT
     promising = [
         s for k, s in enumerate(seen[:most]) if k < least or may_win(s, seen[0].misfit, best)
@@ -226,6 +226,8 @@ def rank_causes(
         for s in seen
         if s.far and s.form.cause in chosen and (s.form.cause, s.form.name) not in held
     ]
+    if not promising:
+        return []
     first = run_jobs(partial(approach, problem, layouts, base.forms), promising, workers)
     reached = [found for found in first if found is not None]
     lowest = min((found.misfit for found in reached), default=0.0)

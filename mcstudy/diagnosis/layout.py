@@ -21,8 +21,8 @@ TIME_ORIGIN = 2e-4
 """s, standard deviation of a test's time origin (assumed: a few samples)."""
 TIME_ORIGIN_KNOWN, LATE = 2e-3, 0.2
 """Shift between test and simulation from which a time origin counts as arbitrary: s, and share of
-the time that the simulation takes to its peak. A wrong speed, posture or geometry makes a peak come
-earlier or later by a share of its time (assumed: by less than a fifth)."""
+the time from the begin of the simulated pulse to its peak. A wrong speed, posture or geometry makes
+a peak come earlier or later by a share of its time (assumed: by less than a fifth)."""
 MODES = 5
 """Smooth factors of the pulse from test to test: cosines over its duration."""
 PULSE = 0.02
@@ -387,8 +387,8 @@ def lay_out(test: Test, seen: Observation) -> Layout:
     large = np.flatnonzero(np.abs(values) >= PULSE * np.abs(values).max())
     window = (float(time[large[0]]), float(time[large[-1]]))
     shift = _shift(signal.time, signal.values, time, values)
-    way = float(time[np.argmax(np.abs(values))] - time[0])
-    if abs(shift) < max(TIME_ORIGIN_KNOWN, LATE * way):
+    rise = float(time[np.argmax(np.abs(values))] - window[0])
+    if abs(shift) < max(TIME_ORIGIN_KNOWN, LATE * rise):
         shift = 0.0
     return Layout(test, shift, (window[0] + shift, window[1] + shift))
 

@@ -38,6 +38,8 @@ HOOD_SD = 0.1
 SCALARS = {"throw_distance": ("m", 0.3), "wad": ("m", 0.02)}
 AFTER_HEAD = 0.03
 """s that are recorded after the head's contact began."""
+UNSEEN = 0.01
+"""s after them that the filter still sees."""
 RATE = 10_000.0
 """Hz of the recorder."""
 HOOD = ((0.0, 0.0), (0.02, 1100.0), (0.06, 2600.0), (0.1, 3600.0))
@@ -84,8 +86,12 @@ def make_crashes(
         inputs = {name: float(values[k]) for name, values in true.items()}
         time, axes, outputs = _crash(reality, inputs)
         share = 1.0 + SCATTER * rng.standard_normal()
+        end = outputs["head_impact_time"] + AFTER_HEAD
+        # An overload at the landing comes after the record.
+        before = time <= end + UNSEEN
+        time, axes = time[before], axes[before]
         shown = read_axes(hidden, share * axes, time, RATE, k / (tests - 1))
-        kept = time <= outputs["head_impact_time"] + AFTER_HEAD
+        kept = time <= end
         shown = shown[kept] + NOISE_SD * rng.standard_normal(kept.sum())
         name = f"c{k + 1}"
         pd.DataFrame({"time": clock(hidden, time[kept]), "head_acceleration": shown}).to_csv(

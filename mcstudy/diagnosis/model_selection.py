@@ -219,7 +219,8 @@ def rank_causes(
         s for k, s in enumerate(seen[:most]) if k < least or may_win(s, seen[0].misfit, best)
     ]
     # Far from the data one form of a cause may start badly and end best.
-    chosen = list(dict.fromkeys(s.form.cause for s in promising))[:MAX_CAUSES]
+    fully = [s for s in promising if not problem.dear or may_win(s, seen[0].misfit, best)]
+    chosen = list(dict.fromkeys(s.form.cause for s in fully))[:MAX_CAUSES]
     held = {(s.form.cause, s.form.name) for s in promising}
     promising += [
         s

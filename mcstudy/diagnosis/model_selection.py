@@ -53,7 +53,7 @@ BEHIND_DEAR = 30.0
 then, so that another one hardly takes it nearer to the best."""
 MAX_CAUSES = 5
 """Causes, far from the data, of which all forms are fitted."""
-MIN_COUNT, MIN_DEAR = 6, 3
+MIN_COUNT, MIN_DEAR = 6, 2
 """Forms that are refitted whatever their expected gain, and of models whose runs are dear."""
 
 

@@ -17,6 +17,7 @@ from mcstudy.diagnosis.screening import estimate_scatter, remaining
 from mcstudy.diagnosis.shortlist import shortlist
 from mcstudy.diagnosis.survey import (
     CLOSE,
+    FAR,
     approach,
     may_win,
     scan_scatter,
@@ -208,7 +209,10 @@ def rank_causes(
             bank = cause_templates(problem, layouts, base, named_forms(causes), workers)
         misfit = solve(centres[-1], centres[-1].residuals, 1.0)[1]
         samples = sum(r.size for r in centres[-1].residuals)
-        forms = shortlist(centres[-1], weight_of(samples, misfit), bank, forms)
+        weight = weight_of(samples, misfit)
+        # Near the data a survey finds what the templates promise.
+        floor = needed / KEPT if weight >= FAR else 0.0
+        forms = shortlist(centres[-1], weight, bank, forms, floor)
     scans = run_jobs(partial(survey, problem, layouts, base.forms, centres, scan), forms, workers)
     seen = sorted((s for s in scans if s is not None), key=lambda s: s.misfit)
     best = max((s.promise for s in seen), default=0.0)

@@ -19,6 +19,7 @@ from mcstudy.diagnosis.shortlist import shortlist
 from mcstudy.diagnosis.survey import (
     CLOSE,
     Survey,
+    FAR,
     approach,
     may_win,
     scan_scatter,
@@ -55,9 +56,14 @@ LITTLE = 0.1
 """Share of what the best form gains that another one must gain to be fitted on."""
 ROUNDS = 3
 """Rounds in which the repeatability of the best form is estimated again."""
+KEPT = 2.0
+"""Factor by which a form near the data may add more than it promises."""
+BEHIND_DEAR = 30.0
+"""The same log units where runs are dear: each form has its own most probable repeatability by
+then, so that another one hardly takes it nearer to the best."""
 MAX_CAUSES = 5
 """Causes, far from the data, of which all forms are fitted."""
-MIN_COUNT, MIN_DEAR = 6, 3
+MIN_COUNT, MIN_DEAR = 6, 2
 """Forms that are refitted whatever their expected gain, and of models whose runs are dear."""
 
 
@@ -170,6 +176,7 @@ def rank_causes(
     workers: int,
     most: int,
     bank: Sequence[Template] | None = None,
+    needed: float = 0.0,
 ) -> list[Candidate]:
     """Return the causes by evidence above a base's, best first.
 
@@ -192,6 +199,9 @@ def rank_causes(
         Largest number of forms that are refitted, the most promising ones.
     bank : sequence of Template, optional
         Templates of the causes about the base, where they are known.
+    needed : float
+        Log evidence that a cause must add. Where runs are dear, forms near the data that promise
+        far less are not fitted.
     """
     unknowns = len(problem.unknowns)
     shared = base.scores.shared.copy()
@@ -208,22 +218,30 @@ def rank_causes(
             bank = cause_templates(problem, layouts, base, named_forms(causes), workers)
         misfit = solve(centres[-1], centres[-1].residuals, 1.0)[1]
         samples = sum(r.size for r in centres[-1].residuals)
-        forms = shortlist(centres[-1], weight_of(samples, misfit), bank, forms)
+        weight = weight_of(samples, misfit)
+        # Near the data a survey finds what the templates promise.
+        floor = needed / KEPT if weight >= FAR else 0.0
+        forms = shortlist(centres[-1], weight, bank, forms, floor)
     scans = run_jobs(partial(survey, problem, layouts, base.forms, centres, scan), forms, workers)
     seen = sorted((s for s in scans if s is not None), key=lambda s: s.misfit)
     best = max((s.promise for s in seen), default=0.0)
+    if problem.dear and needed > 0.0:
+        seen = [s for s in seen if s.far or KEPT * s.promise > needed]
     least = MIN_DEAR if problem.dear else MIN_COUNT
     promising = [
         s for k, s in enumerate(seen[:most]) if k < least or may_win(s, seen[0].misfit, best)
     ]
     # Far from the data one form of a cause may start badly and end best.
-    chosen = list(dict.fromkeys(s.form.cause for s in promising))[:MAX_CAUSES]
+    fully = [s for s in promising if not problem.dear or may_win(s, seen[0].misfit, best)]
+    chosen = list(dict.fromkeys(s.form.cause for s in fully))[:MAX_CAUSES]
     held = {(s.form.cause, s.form.name) for s in promising}
     promising += [
         s
         for s in seen
         if s.far and s.form.cause in chosen and (s.form.cause, s.form.name) not in held
     ]
+    if not promising:
+        return []
     tempered = run_jobs(partial(temper, problem, layouts, base.forms), promising, workers)
     nearer = [s for s in tempered if s is not None]
     if nearer and nearer[0].far:
@@ -244,7 +262,8 @@ def rank_causes(
         if again.log_evidence < top.log_evidence + DISTINCT:
             break
         top = again
-    behind = max(FAR_BEHIND, HALF * (top.log_evidence - base.log_evidence))
+    least_behind = BEHIND_DEAR if problem.dear else FAR_BEHIND
+    behind = max(least_behind, HALF * (top.log_evidence - base.log_evidence))
     ahead = [found for found in settled if found.log_evidence > top.log_evidence - behind]
     refit = partial(with_given_scatter, problem, layouts, top.scatter, exact=True)
     base, *fits = run_jobs(refit, [base, *ahead], workers)

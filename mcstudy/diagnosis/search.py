@@ -254,16 +254,15 @@ def _judge(
         alone, flagged=True, why="one cause explains most of the misfit; structure remains"
     )
     little = not clean and best.log_evidence < WIDENING * doubt
-    if (
-        clean
-        and left.left < STILL
-        and not _trace(problem, causes, empty.layouts, best.fitted, workers)
-    ):
-        return alone
+    bank = None
+    if clean and left.left < STILL:
+        bank = cause_templates(problem, empty.layouts, best.fitted, named_forms(causes), workers)
+        if not _trace(best.fitted, empty.layouts, bank):
+            return alone
     found, share = None, left.share
     if left.share >= HOPELESS:
         tell(f"looking for a second cause beside {best.cause.name}")
-        found, beyond = _best_pair(problem, causes, empty, candidates, left, workers)
+        found, beyond = _best_pair(problem, causes, empty, candidates, left, workers, bank)
         # The repeatability takes part of what is left; a second cause may show that it did.
         share = min(share, best.log_evidence / (best.log_evidence + max(beyond, 0.0)))
     if found is not None:
@@ -308,15 +307,8 @@ def _conflict(problem: Problem, found: Finding) -> str:
     )
 
 
-def _trace(
-    problem: Problem,
-    causes: Sequence[Cause],
-    layouts: Sequence[Layout],
-    fitted: Fit,
-    workers: int,
-) -> bool:
+def _trace(fitted: Fit, layouts: Sequence[Layout], bank: Sequence[Template]) -> bool:
     """Return whether a template detects a further cause that the general test misses."""
-    bank = cause_templates(problem, layouts, fitted, named_forms(causes), workers)
     score, information = score_templates(fitted, layouts, bank)
     seen = information > 0.0
     return bool(np.any(np.abs(score[seen]) > FURTHER * np.sqrt(information[seen])))
@@ -332,6 +324,12 @@ def _near(candidates: Sequence[Candidate], left: float = 0.0) -> tuple[str, ...]
     limit = candidates[0].log_evidence - apart
     near = tuple(c.cause.name for c in candidates if c.log_evidence > limit)
     return near if len(near) > 1 else ()
+
+
+def _needed(sole: float, alone: Remainder) -> float:
+    """Return the log evidence that a second cause must add beside a first one of evidence sole."""
+    small = FAINT_SHARE * sole if alone.p_value >= STRUCTURE else ENOUGH * alone.left
+    return max(SECOND, small)
 
 
 @dataclass(frozen=True)
@@ -359,6 +357,7 @@ def _best_pair(
     candidates: Sequence[Candidate],
     alone: Remainder,
     workers: int,
+    bank: Sequence[Template] | None,
 ) -> tuple[tuple[_Pair, Remainder, tuple[str, ...]] | None, float]:
     """Return the pair of causes that explains the misfit, None if no second cause is warranted.
 
@@ -369,12 +368,18 @@ def _best_pair(
     ----------
     alone : Remainder
         Remaining structure of the first cause alone.
+    bank : sequence of Template or None
+        Templates about it, where they are known.
     """
     pairs: list[_Pair] = []
     for first in candidates[:PAIRS]:
         if first.log_evidence < RIVAL * candidates[0].log_evidence:
             continue
-        seconds = rank_causes(problem, empty.layouts, first.fitted, causes, workers, SECONDS)
+        seconds = rank_causes(
+            problem, empty.layouts, first.fitted, causes, workers, SECONDS,
+            bank if first is candidates[0] else None,
+            min(_needed(first.log_evidence, alone), NOTABLE * first.log_evidence),
+        )  # fmt: skip
         if seconds:
             pairs.append(_Pair(first, seconds))
     if not pairs:
@@ -386,8 +391,7 @@ def _best_pair(
         return None, beyond
     left = examine(problem, empty.layouts, best.seconds[0].fitted, sole + added)
     if left.p_value >= STRUCTURE:
-        small = FAINT_SHARE * sole if alone.p_value >= STRUCTURE else ENOUGH * alone.left
-        enough = added >= max(SECOND, small)
+        enough = added >= _needed(sole, alone)
     else:
         enough = left.share >= NEARLY_ALL and added >= NOTABLE * sole
     if not enough:

@@ -15,7 +15,11 @@ LESS = 4.0
 
 
 def shortlist(
-    centre: Centre, weight: float, bank: Sequence[Template], forms: Sequence[Form]
+    centre: Centre,
+    weight: float,
+    bank: Sequence[Template],
+    forms: Sequence[Form],
+    floor: float = 0.0,
 ) -> list[Form]:
     """Return the forms whose templates promise most, in their order.
 
@@ -33,6 +37,8 @@ def shortlist(
         Of the forms, about the model.
     forms : sequence of Form
         To choose from.
+    floor : float
+        Gain below which a cause is not listed at all.
     """
     without = solve(centre, centre.residuals, weight)[1]
     gains: dict[tuple[str, str], float] = {}
@@ -50,7 +56,8 @@ def shortlist(
     if not ranked:
         return list(forms)
     limit = causes[ranked[0]] / LESS
-    kept = {cause for k, cause in enumerate(ranked) if k < LEAST or causes[cause] > limit}
+    worth = [cause for cause in ranked if causes[cause] >= floor]
+    kept = {cause for k, cause in enumerate(worth) if k < LEAST or causes[cause] > limit}
     return [
         form
         for form in forms

@@ -27,6 +27,8 @@ DRIFT = 2.0
 """Unit of a drift in latents per standard deviation of its covariate."""
 PULSE_DRIFT = 0.02
 """The same for the pulse, relative."""
+ALL_TESTS = "all tests"
+"""Factor of what is the same in all tests."""
 ONE_PARAMETER = (-2.0, -1.0, -0.3, -0.1, 0.1, 0.3, 1.0, 2.0)
 MORE_PARAMETERS = (-2.0, -1.0, 0.0, 1.0, 2.0)
 FINE = tuple(np.linspace(-2.5, 2.5, 17))
@@ -189,6 +191,9 @@ def regimes_of(layouts: Sequence[Layout]) -> dict[str, Array]:
 def drifts(layouts: Sequence[Layout], fitted: Fit, shared: Sequence[str]) -> Shapes:
     """Return every nuisance and every shared value drifting along every covariate.
 
+    With them, recorded inputs that are off by the same in all tests: errors of single tests have
+    mean zero, and a common one that they take hides where a template is not quite linear.
+
     Parameters
     ----------
     layouts : sequence of Layout
@@ -198,8 +203,8 @@ def drifts(layouts: Sequence[Layout], fitted: Fit, shared: Sequence[str]) -> Sha
     shared : sequence of str
         Names of the shared values.
     """
-    names: list[str] = []
-    columns: list[list[Array]] = [[] for _ in layouts]
+    names = [f"{name} with {ALL_TESTS}" for name in layouts[0].test.doubtful]
+    columns = [[DRIFT * slopes[:, k] for k in range(len(names))] for slopes in fitted.own_slopes]
     for covariate, factor in covariates_of(layouts).items():
         for k, name in enumerate(layouts[0].names):
             scattering = bool(layouts[0].scattering[k])
@@ -220,7 +225,7 @@ def drifts(layouts: Sequence[Layout], fitted: Fit, shared: Sequence[str]) -> Sha
 def smooth_discrepancy(layouts: Sequence[Layout], fitted: Fit) -> Shapes:
     """Return products of pulse and cosines: alone, times regimes, times covariates."""
     factors: Mapping[str, Array] = {
-        "all tests": np.ones(len(layouts)),
+        ALL_TESTS: np.ones(len(layouts)),
         **regimes_of(layouts),
         **covariates_of(layouts),
     }
@@ -231,7 +236,7 @@ def fine_discrepancy(layouts: Sequence[Layout], fitted: Fit) -> Shapes:
     """Return the finer cosines, the same in all tests."""
     length = max(layout.window[1] - layout.window[0] for layout in layouts)
     last = min(SMOOTH + MAX_FINE, int(2.0 * length * HIGHEST))
-    factors = {"all tests": np.ones(len(layouts))}
+    factors = {ALL_TESTS: np.ones(len(layouts))}
     return _discrepancy(layouts, fitted, range(SMOOTH, last), factors, shaped=False)
 
 

@@ -11,8 +11,13 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-KNOWN = 2e-3
-"""s between measured and simulated pulse from which a time origin counts as arbitrary."""
+KNOWN, LATE = 2e-3, 0.2
+"""Shift between measured and simulated pulse from which a time origin counts as arbitrary: s, and
+share of the time from the begin of the simulated pulse to its peak. A wrong speed, posture or
+geometry makes a peak come earlier or later by a share of its time (assumed: by less than a
+fifth)."""
+BEGIN = 0.02
+"""Share of the simulated peak at which its pulse begins."""
 FLANK = 0.2
 """Share of the smaller of the two peaks at which flanks are compared: above noise and offsets,
 and below the plateaus that follow (assumed)."""
@@ -32,9 +37,12 @@ def time_shift(
     step : float
         s, resolution of the comparison of whole pulses.
     """
-    level = FLANK * min(np.abs(values).max(), np.abs(model_values).max())
+    size = np.abs(model_values)
+    begin = model_time[int(np.argmax(size >= BEGIN * size.max()))]
+    known = max(KNOWN, LATE * float(model_time[int(np.argmax(size))] - begin))
+    level = FLANK * min(np.abs(values).max(), size.max())
     flanks = _rise(time, values, level) - _rise(model_time, model_values, level)
-    if abs(flanks) < KNOWN or abs(_lag(time, values, model_time, model_values, step)) < KNOWN:
+    if abs(flanks) < known or abs(_lag(time, values, model_time, model_values, step)) < known:
         return 0.0
     return flanks
 

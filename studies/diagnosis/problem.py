@@ -1,6 +1,6 @@
 """Measured data and a model as the problem of a diagnosis."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from mcstudy import units
 from mcstudy.diagnosis.channels import computed_channels
 from mcstudy.diagnosis.noise import estimate_noise
-from mcstudy.diagnosis.problem import Problem, Scalar, Signal, Test, Unknown
+from mcstudy.diagnosis.problem import Observation, Problem, Scalar, Signal, Test, Unknown
 from mcstudy.errors import UserError
 from mcstudy.measurement.measured_data import HEADER, Measured
 from mcstudy.studyfile.distributions import Distribution
 from mcstudy.studyfile.input_space import InputSpace
 from models.criteria.filters import settling_time
 from models.criteria.units import STANDARD_GRAVITY
-from models.protocol import Channel, Model
+from models.protocol import Channel, Input, Model
 from studies.diagnosis.model_choice import ModelChoice
 from studies.diagnosis.simulation import Simulation, channel_units
 
@@ -27,8 +27,8 @@ BIN = 5e-5
 """s: finer samples of a signal are averaged."""
 BEFORE = 1e-3
 """Minimum lead (s) before the first sizeable sample; earlier samples count as noise."""
-SIZEABLE = 0.05
-"""Share of the peak above which a sample is sizeable."""
+SIZEABLE, STILL = 0.05, 1e-3
+"""Shares of the peak above which a sample is sizeable, and below which a simulation is at rest."""
 MIN_COUNT = 3
 """Minimum number of tests of a diagnosis."""
 DEAR = 0.01
@@ -64,8 +64,10 @@ def build_problem(data: Measured, choice: ModelChoice, simulation: Simulation) -
                 )
     if len(data.tests) < MIN_COUNT:
         raise UserError(f"{data.source / 'tests.csv'}: a diagnosis takes {MIN_COUNT} tests or more")
-    noise = _noise_of(data, channel_units(model, list(header.signals)))
-    tests = tuple(_test(data, model, k, choice.fixed, noise) for k in range(len(data.tests)))
+    recorded = [_recorded(data, inputs, k, choice.fixed) for k in range(len(data.tests))]
+    seen = [simulation(given, {}) for given, _ in recorded] if header.signals else []
+    noise = _noise_of(data, channel_units(model, list(header.signals)), seen)
+    tests = tuple(_test(data, model, k, *given, noise) for k, given in enumerate(recorded))
     refused = computed_channels(
         tests, mass="headform_mass", speed="impact_speed", gravity=STANDARD_GRAVITY
     )
@@ -104,7 +106,10 @@ class _Channel:
     correlation: float
 
 
-def _noise_of(data: Measured, names: Mapping[str, str]) -> dict[str, _Channel]:
+def _noise_of(
+    data: Measured, names: Mapping[str, str], seen: Sequence[Observation | None]
+) -> dict[str, _Channel]:
+    """Return the noise of the signals, from samples at which the simulated tests are at rest."""
     found = {}
     place = data.source / HEADER
     for name, entry in data.header.signals.items():
@@ -115,9 +120,11 @@ def _noise_of(data: Measured, names: Mapping[str, str]) -> dict[str, _Channel]:
         scale = units.factor(entry.unit, unit)
         shrink = np.sqrt(_bin_size(data.signal(data.tests["test"].iloc[0], name, unit)[0]))
         try:
-            before = max(BEFORE, settling_time(entry.channel_class) if entry.channel_class else 0.0)
+            least = max(BEFORE, settling_time(entry.channel_class) if entry.channel_class else 0.0)
+            before = [max(least, _rise(*one.signals[name]) if one else 0.0) for one in seen]
             noise = estimate_noise(
-                [_lead_in(*s, before) for s in series], entry.sd * scale / shrink
+                [_lead_in(*s, early) for s, early in zip(series, before, strict=True)],
+                entry.sd * scale / shrink,
             )
         except ValueError as error:
             raise UserError(f"{place}: signals.{name}: {error}") from None
@@ -139,24 +146,29 @@ def _thinned(time: Array, values: Array) -> tuple[Array, Array]:
     return means[0], means[1]
 
 
+def _rise(time: Array, values: Array) -> float:
+    """Return the time (s) that a simulated signal takes from rest to its first sizeable sample.
+
+    In a crash the head moves long before it strikes: such samples hold more than noise.
+    """
+    size, peak = np.abs(values), float(np.abs(values).max())
+    sizeable, moving = (int(np.argmax(size >= share * peak)) for share in (SIZEABLE, STILL))
+    return float(time[sizeable] - time[moving])
+
+
 def _lead_in(time: Array, values: Array, before: float) -> Array:
     """Return the samples before contact, ``before`` (s) which the filter has not answered yet."""
     first = int(np.argmax(np.abs(values) >= SIZEABLE * np.abs(values).max()))
     return np.asarray(values[time < time[first] - before])
 
 
-def _test(
-    data: Measured,
-    model: Model,
-    row: int,
-    fixed: Mapping[str, float],
-    noise: Mapping[str, _Channel],
-) -> Test:
-    header = data.header
+def _recorded(
+    data: Measured, known: Mapping[str, Input], row: int, fixed: Mapping[str, float]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the inputs of a test as recorded, and the standard uncertainties of doubtful ones."""
     name = str(data.tests["test"].iloc[row])
-    known = {item.name: item for item in model.inputs}
     inputs, doubtful = dict(fixed), {}
-    for column in header.inputs:
+    for column in data.header.inputs:
         found = data.input_value(column, row, known[column].unit)
         assert found is not None
         item = known[column]
@@ -168,6 +180,19 @@ def _test(
         inputs[column] = found[0]
         if found[1] > 0.0:
             doubtful[column] = found[1]
+    return inputs, doubtful
+
+
+def _test(
+    data: Measured,
+    model: Model,
+    row: int,
+    inputs: Mapping[str, float],
+    doubtful: Mapping[str, float],
+    noise: Mapping[str, _Channel],
+) -> Test:
+    header = data.header
+    name = str(data.tests["test"].iloc[row])
     signals = []
     for channel, entry in noise.items():
         time, values = _thinned(*data.signal(name, channel, entry.unit))

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mcstudy.diagnosis.screening import FLIP_LEVEL
+from mcstudy.diagnosis.templates import ALL_TESTS
 from mcstudy.figures.style import words
 from mcstudy.statistics import Estimate
 from mcstudy.text import capital, interval, number, percent, quantity, unit
@@ -155,6 +156,8 @@ def _drift(name: str) -> str:
     kind, _, channel = nuisance.partition(":")
     what = {"pulse": "the pulse", "offset": f"the offset of {words(channel)}",
             "time_origin": "the time origin", "scatter": words(channel)}  # fmt: skip
+    if covariate == ALL_TESTS:
+        return f"{what.get(kind, words(nuisance))} is off by the same in all tests"
     along = "the order of the tests" if covariate == "order" else words(covariate)
     return f"{what.get(kind, words(nuisance))} changes with {along}"
 

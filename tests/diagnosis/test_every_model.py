@@ -124,3 +124,11 @@ def test_accidents_with_a_wet_road_are_diagnosed(
     assert seen is not None
     assert not seen.signals
     assert set(seen.scalars) == {*(s.name for s in problem.tests[0].scalars), "head_impact_time"}
+
+
+def test_the_motion_before_the_heads_impact_is_no_noise(tmp_path: Path) -> None:
+    make_crashes(tmp_path / "data", [], 2, 3)
+    data = load_measured(tmp_path / "data")
+    choice = choose_model(data, None)
+    problem = build_problem(data, choice, simulation_of(data, choice))
+    assert {(s.sd, s.correlation) for test in problem.tests for s in test.signals} == {(1.0, 0.0)}

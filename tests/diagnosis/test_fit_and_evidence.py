@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linear_tests import BUMP, Linear, make_problem
+from numpy.typing import NDArray
 from scipy import optimize, stats
 
 from mcstudy.diagnosis.fit import Fit, fit, start_scores
@@ -13,7 +14,7 @@ from mcstudy.diagnosis.layout import Layout, Scatter, lay_out
 from mcstudy.diagnosis.marginal import Marginal, log_bayes_factor, quadratic_form
 from mcstudy.diagnosis.model_selection import examine, rank_causes, settle
 from mcstudy.diagnosis.normal_equations import Scores
-from mcstudy.diagnosis.problem import Observation, Problem, Scalar, Test
+from mcstudy.diagnosis.problem import Observation, Problem, Scalar, Signal, Test
 from mcstudy.diagnosis.search import UNEXPLAINED, fit_base, search
 
 SCATTER = Scatter(0.01, 0.003)
@@ -240,3 +241,24 @@ def test_a_dear_model_takes_fewer_runs_to_the_same_answer() -> None:
         answers.append((found.cause, found.ambiguous, found.second))
     assert answers == [("bump", (), None)] * 2
     assert runs[1] < 0.9 * runs[0]
+
+
+@pytest.mark.parametrize(
+    ("late", "peak", "shift"), [(4e-3, 0.07, 0.0), (4e-3, 0.007, 4e-3), (30e-3, 0.07, 30e-3)]
+)
+def test_a_peak_that_comes_late_by_a_share_of_its_time_is_no_time_origin(
+    late: float, peak: float, shift: float
+) -> None:
+    """A wrong speed moves the head's impact in a crash, long after first contact."""
+
+    def felt(time: NDArray[np.float64]) -> NDArray[np.float64]:
+        # The body is pushed from the beginning; the head strikes at the peak.
+        pushed = 10.0 * np.clip(time / 1e-3, 0.0, 1.0) * (time < peak + 0.01)
+        return pushed + 90.0 * np.exp(-0.5 * ((time - peak) / 1e-3) ** 2)
+
+    time = np.arange(0.0, 0.15, 1e-4)
+    test = Test(
+        "c1", {}, {}, (Signal("head_acceleration", time, felt(time - late), 1.0),), (), (), {}
+    )
+    found = lay_out(test, Observation({"head_acceleration": (time, felt(time))}, {}))
+    assert found.shift == pytest.approx(shift, abs=2e-4)

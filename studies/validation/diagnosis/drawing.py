@@ -155,7 +155,8 @@ CRASHES: dict[str, list[Draw]] = {
     ],
     "mass_error": [_factor("mass_error", 0.08, 0.3)],
     "brake_dive": [_one("brake_dive", "catalogue", "angle", angle=(0.008, 0.04))],
-    "muscle_tone": [_factor("muscle_tone", 0.6, 2.5)],
+    # Muscles are tenser than relaxed ones: never a negative factor.
+    "muscle_tone": [_one("muscle_tone", "catalogue", excess=(0.6, 2.5))],
     "friction_level": [_factor("friction_level", 0.1, 0.4)],
 }
 """Effects of full-scale tests by the name of the cause; of the ten and more, those of the

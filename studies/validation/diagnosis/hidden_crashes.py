@@ -1,11 +1,11 @@
 """Full-scale tests with a hidden effect: a crash model with altered inputs, seen by an instrument.
 
-Nothing of the diagnosis's catalogue is used: errors of the instruments are applied to the raw
-signal by the code of the hidden headform tests, the others are inputs or a loading curve that
-differ from those that the folder states.
+Nothing of the diagnosis's catalogue is used: errors of the instruments are applied to the three
+axes of the raw signal by the code of the hidden headform tests, the others are inputs or a loading
+curve that differ from those that the folder states.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +13,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from models.crash.model import CrashModel
+from models.crash.outcome import Raw, Signals
+from models.crash.record import Column
+from models.criteria.units import STANDARD_GRAVITY
+from models.protocol import Model, complete_inputs
 from models.registry import load_model
 from studies.validation.diagnosis.hidden_accidents import alter
 from studies.validation.diagnosis.hidden_hood import find
-from studies.validation.diagnosis.hidden_instrument import clock, filtered, read
+from studies.validation.diagnosis.hidden_instrument import clock, read_axes
 from studies.validation.diagnosis.laboratory import Hidden
 
 Array = NDArray[np.float64]
@@ -33,6 +38,8 @@ HOOD_SD = 0.1
 SCALARS = {"throw_distance": ("m", 0.3), "wad": ("m", 0.02)}
 AFTER_HEAD = 0.03
 """s that are recorded after the head's contact began."""
+UNSEEN = 0.01
+"""s after them that the filter still sees."""
 RATE = 10_000.0
 """Hz of the recorder."""
 HOOD = ((0.0, 0.0), (0.02, 1100.0), (0.06, 2600.0), (0.1, 3600.0))
@@ -76,24 +83,37 @@ def make_crashes(
     (folder / "signals").mkdir(parents=True)
     rows = []
     for k in range(tests):
-        run = reality.run({name: float(values[k]) for name, values in true.items()})
-        head = run.histories["head"]
-        progress = k / (tests - 1)
+        inputs = {name: float(values[k]) for name, values in true.items()}
+        time, axes, outputs = _crash(reality, inputs)
         share = 1.0 + SCATTER * rng.standard_normal()
-        felt = read(hidden, share * head.channels["acceleration"], head.time, progress)
-        kept = head.time <= run.outputs["head_impact_time"] + AFTER_HEAD
-        shown = filtered(felt, RATE, hidden)[kept] + NOISE_SD * rng.standard_normal(kept.sum())
+        end = outputs["head_impact_time"] + AFTER_HEAD
+        # An overload at the landing comes after the record.
+        before = time <= end + UNSEEN
+        time, axes = time[before], axes[before]
+        shown = read_axes(hidden, share * axes, time, RATE, k / (tests - 1))
+        kept = time <= end
+        shown = shown[kept] + NOISE_SD * rng.standard_normal(kept.sum())
         name = f"c{k + 1}"
-        pd.DataFrame({"time": clock(hidden, head.time[kept]), "head_acceleration": shown}).to_csv(
+        pd.DataFrame({"time": clock(hidden, time[kept]), "head_acceleration": shown}).to_csv(
             folder / "signals" / f"{name}.csv", index=False
         )
         row = {"test": name, "impact_speed": speeds[k] + SPEED_SD * rng.standard_normal()}
         for scalar, (_, sd) in SCALARS.items():
-            row[scalar] = run.outputs[scalar] * (1.0 + SCATTER * rng.standard_normal())
+            row[scalar] = outputs[scalar] * (1.0 + SCATTER * rng.standard_normal())
             row[scalar] += sd * rng.standard_normal()
         rows.append(row)
     pd.DataFrame(rows).to_csv(folder / "tests.csv", index=False)
     (folder / "measured.toml").write_text(_header(stated or model), encoding="utf-8")
+
+
+def _crash(reality: Model, inputs: Mapping[str, float]) -> tuple[Array, Array, dict[str, float]]:
+    """Return times (n,), head accelerations along its own axes (n, 3), g, and outputs."""
+    assert isinstance(reality, CrashModel)
+    raw = reality._simulate(complete_inputs(reality, inputs))
+    assert isinstance(raw, Raw)
+    signals = Signals(raw)
+    true = signals.sampled(Column.ACCELERATION, 3, signals.head_time) / STANDARD_GRAVITY
+    return signals.head_time, true, reality._judge(raw, signals)[1]
 
 
 def _curve(hidden: Sequence[Hidden]) -> list[list[float]]:

@@ -56,16 +56,40 @@ def _saturation(h: Hidden, acceleration: Array, time: Array, _progress: float) -
     limit = h.numbers["limit"]
     if h.form == "soft":
         return np.asarray(limit * np.tanh(acceleration / limit))
-    if h.form == "recovery":
+    clipped = np.clip(acceleration, -limit, limit)
+    over = np.flatnonzero(np.abs(acceleration) > limit)
+    if h.form == "recovery" and over.size:
         # An overdriven amplifier reads too low for a while.
-        over = np.flatnonzero(acceleration > limit)
-        clipped = np.minimum(acceleration, limit)
-        if over.size:
-            since = time - time[over[-1]]
-            tail = h.numbers["depth"] * limit * np.exp(-since / h.numbers["time"])
-            clipped = clipped - np.where(since > 0.0, tail, 0.0)
-        return np.asarray(clipped)
-    return np.asarray(np.minimum(acceleration, limit))
+        since = np.maximum(time - time[over[-1]], 0.0)
+        depth = h.numbers["depth"] * limit * np.sign(acceleration[over[-1]])
+        tail = depth * np.exp(-since / h.numbers["time"])
+        clipped = clipped - np.where(since > 0.0, tail, 0.0)
+    return np.asarray(clipped)
+
+
+def read_axes(
+    hidden: Sequence[Hidden], acceleration: Array, time: Array, rate: float, progress: float
+) -> Array:
+    """Return the resultant (n,) of three axes that are read and filtered each by itself (g).
+
+    Parameters
+    ----------
+    hidden : sequence of Hidden
+        Effects; an offset is that of the first axis.
+    acceleration : (n, 3) array
+        True acceleration along the axes, g.
+    time : (n,) array
+        s.
+    rate : float
+        Sampling rate, Hz.
+    progress : float
+        Place of the test in the order of tests, 0 to 1.
+    """
+    shown = []
+    for k, axis in enumerate(acceleration.T):
+        own = [h for h in hidden if k == 0 or h.name != "sensor_offset"]
+        shown.append(filtered(read(own, axis, time, progress), rate, hidden))
+    return np.asarray(np.linalg.norm(shown, axis=0))
 
 
 def _cable(h: Hidden, acceleration: Array, time: Array, _progress: float) -> Array:

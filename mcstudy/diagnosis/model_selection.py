@@ -18,8 +18,8 @@ from mcstudy.diagnosis.screening import estimate_scatter, remaining
 from mcstudy.diagnosis.shortlist import shortlist
 from mcstudy.diagnosis.survey import (
     CLOSE,
-    Survey,
     FAR,
+    Survey,
     approach,
     may_win,
     scan_scatter,

@@ -13,9 +13,9 @@ Array = NDArray[np.float64]
 
 KNOWN, LATE = 2e-3, 0.2
 """Shift between measured and simulated pulse from which a time origin counts as arbitrary: s, and
-share of the time from the begin of the simulated pulse to its peak. A wrong speed, posture or
-geometry makes a peak come earlier or later by a share of its time (assumed: by less than a
-fifth)."""
+share of the time from the begin of the simulated pulse to its flank. In a crash the head moves
+long before it strikes, and a wrong speed, posture or geometry makes it strike earlier or later by a
+share of that time (assumed: by less than a fifth)."""
 BEGIN = 0.02
 """Share of the simulated peak at which its pulse begins."""
 FLANK = 0.2
@@ -38,10 +38,11 @@ def time_shift(
         s, resolution of the comparison of whole pulses.
     """
     size = np.abs(model_values)
-    begin = model_time[int(np.argmax(size >= BEGIN * size.max()))]
-    known = max(KNOWN, LATE * float(model_time[int(np.argmax(size))] - begin))
     level = FLANK * min(np.abs(values).max(), size.max())
-    flanks = _rise(time, values, level) - _rise(model_time, model_values, level)
+    flank = _rise(model_time, model_values, level)
+    begin = float(model_time[int(np.argmax(size >= BEGIN * size.max()))])
+    known = max(KNOWN, LATE * (flank - begin))
+    flanks = _rise(time, values, level) - flank
     if abs(flanks) < known or abs(_lag(time, values, model_time, model_values, step)) < known:
         return 0.0
     return flanks

@@ -13,8 +13,10 @@ from mcstudy.studyfile.identity import numbers_digest
 from mcstudy.studyfile.schema import FactorStudy
 from mcstudy.studyfile.study_inputs import check_independent, map_inputs
 from mcstudy.studyfile.study_outputs import report_outputs
+from studies.explorer import explorer_pages
 from studies.kind import StudyKind
 from studies.runs import ModelRuns, RunEnds, RunPlan, complete_blocks, load_study_model
+from studies.stored_scenes import keep_scenes
 
 
 @dataclass(frozen=True)
@@ -54,3 +56,11 @@ class FactorKind(StudyKind[Study, RunPlan, ModelRuns, Analysis]):
         """Return the model and the runs of the blocks that are whole."""
         model = load_study_model(study)
         return ModelRuns(model, complete_blocks(folder, model))
+
+    def keep(self, study: Study, plan: RunPlan, folder: ResultsFolder) -> None:
+        """Keep notable runs in three dimensions."""
+        keep_scenes(study, plan.model, complete_blocks(folder, plan.model), folder)
+
+    def pages(self, study: Study, results: ModelRuns, folder: ResultsFolder) -> Mapping[str, str]:
+        """Return the explorer of the runs."""
+        return explorer_pages(study, results.model, results.runs, folder)

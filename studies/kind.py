@@ -92,6 +92,7 @@ class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
         with folder.open_for_writing():
             folder.write_text("study.toml", text)
             self.execute(study, plan, folder, workers=workers, quiet=quiet)
+            self.keep(study, plan, folder)
             return self.build_report(study, folder)
 
     def build_report(self, study: Study, folder: ResultsFolder) -> Analysis:
@@ -162,6 +163,19 @@ class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
             Processes, -1 for one per core, or the address of a dask scheduler.
         quiet : bool
             No progress line.
+        """
+
+    def keep(self, study: Study, plan: Plan, folder: ResultsFolder) -> None:
+        """Keep what the report shows of single runs; nothing unless a kind has something.
+
+        Parameters
+        ----------
+        study : AnyStudy
+            Study file of the kind, checked.
+        plan : Plan
+            From ``plan``.
+        folder : ResultsFolder
+            Open for writing; holds all runs.
         """
 
     @abstractmethod

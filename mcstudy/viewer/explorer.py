@@ -12,6 +12,9 @@ from mcstudy.viewer.page import MARK, render_page, viewer_shell
 
 Array = NDArray[np.float64]
 
+MANY, LEVELS, LARGEST = 5000, 32767.0, 1e30
+"""Runs from which on values are held to sixteen bits; levels on either side of zero; largest value
+for which that is done."""
 SHOWN = 6
 """Axes that are shown first."""
 
@@ -23,6 +26,14 @@ class Column:
     name: str
     label: str
     values: Array
+
+
+def _pack(values: Array, packer: Packer) -> dict[str, Any]:
+    """Return the place of a column's values: of many runs to sixteen bits, else as they are."""
+    finite = np.abs(values[np.isfinite(values)])
+    if values.size < MANY or not 0.0 < finite.max(initial=0.0) < LARGEST:
+        return packer.add(values)
+    return packer.add(values, "i2", float(finite.max()) / LEVELS)
 
 
 @dataclass(frozen=True)
@@ -73,7 +84,7 @@ def render_explorer(
                 "name": column.name,
                 "label": column.label,
                 "shown": column.name in shown,
-                "values": packer.add(column.values),
+                "values": _pack(column.values, packer),
             }
             for column in sorted(
                 columns, key=lambda c: shown.index(c.name) if c.name in shown else SHOWN

@@ -21,6 +21,7 @@ from mcstudy.studyfile.identity import numbers_digest
 from mcstudy.studyfile.study_inputs import fixed_values
 from mcstudy.studyfile.study_outputs import check_outputs
 from models.protocol import Model
+from studies.explorer import explorer_pages
 from studies.injury.analysis import CASES, analyse, outcomes_of
 from studies.injury.cells import Cell, cells_of
 from studies.injury.numbers import InjuryAnalysis
@@ -31,6 +32,7 @@ from studies.kind import Finished, StudyKind
 from studies.monte_carlo.design import sample_inputs
 from studies.paired_runs import PreparedCell, cell_folder, cell_runs, run_cells
 from studies.runs import RunEnds, check_failure_rate, load_study_model
+from studies.stored_scenes import keep_scenes
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,20 @@ class Injury(StudyKind[InjuryStudy, list[PreparedCell], InjuryResults, InjuryAna
             No progress line.
         """
         run_cells(study, folder, plan, workers=workers, quiet=quiet)
+
+    def keep(self, study: InjuryStudy, plan: list[PreparedCell], folder: ResultsFolder) -> None:
+        """Keep notable runs of the reference in three dimensions."""
+        first = plan[0]
+        runs = cell_runs(folder, first.name, study.design.n, first.model)
+        keep_scenes(first.study, first.model, runs, cell_folder(folder, first.name))
+
+    def pages(
+        self, study: InjuryStudy, results: InjuryResults, folder: ResultsFolder
+    ) -> Mapping[str, str]:
+        """Return the explorer of the runs of the reference."""
+        cell = next(iter(cells_of(study)))
+        runs = cell_runs(folder, cell.name, study.design.n, results.model)
+        return explorer_pages(cell.study, results.model, runs, cell_folder(folder, cell.name))
 
     def results(self, study: InjuryStudy, folder: ResultsFolder) -> InjuryResults:
         """Return the cases of all cells and write them to the folder."""

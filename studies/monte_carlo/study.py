@@ -44,7 +44,7 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns, MonteCarloAnalys
         workers: Workers,
         quiet: bool,
     ) -> None:
-        """Run the missing runs and keep the histories of the first runs.
+        """Run the missing runs of the design.
 
         Parameters
         ----------
@@ -59,17 +59,17 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns, MonteCarloAnalys
         quiet : bool
             No progress line.
         """
-        runs = run_design(study, plan, folder, workers=workers, quiet=quiet)
+        run_design(study, plan, folder, workers=workers, quiet=quiet)
+
+    def keep(self, study: MonteCarloStudy, plan: RunPlan, folder: ResultsFolder) -> None:
+        """Keep the histories of the first runs, and notable runs in three dimensions."""
+        runs = runs_of_design(study, folder).runs
         _keep_histories(study, plan.model, runs, folder)
-        observed = {
-            output: mark.value
+        near = [
+            Measured(output, mark.value, float(runs[output].std()) or 1.0)
             for output, marks in marks_of(study, plan.model).items()
             for mark in marks
             if mark.kind == "observed"
-        }
-        near = [
-            Measured(name, value, float(runs[name].std()) or 1.0)
-            for name, value in observed.items()
         ]
         keep_scenes(study, plan.model, runs, folder, near)
 

@@ -64,13 +64,16 @@ class PosteriorOf(StudyKind[PosteriorStudy, RunPlan, ModelRuns, PosteriorAnalysi
         quiet : bool
             No progress line.
         """
-        runs = run_design(study, plan, folder, workers=workers, quiet=quiet)
+        run_design(study, plan, folder, workers=workers, quiet=quiet)
+
+    def keep(self, study: PosteriorStudy, plan: RunPlan, folder: ResultsFolder) -> None:
+        """Keep notable runs in three dimensions, those nearest to the evidence first."""
         near = [
             Measured(item.name, item.value, item.sd)
             for item in items_of(study, plan.model).values()
             if item.value is not None
         ]
-        keep_scenes(study, plan.model, runs, folder, near)
+        keep_scenes(study, plan.model, runs_of_design(study, folder).runs, folder, near)
 
     def results(self, study: PosteriorStudy, folder: ResultsFolder) -> ModelRuns:
         """Return the model and the runs of the design."""

@@ -281,7 +281,7 @@ def test_another_study_is_refused_with_what_differs_and_changes_nothing(
     said = told(mcstudy("run", study_file(tmp_path / "s.toml", text), "--out", finished.path))
     assert f"holds another study (it differs in {differs})" in said
     if kind in ("injury", "model-comparison", "model-chain"):
-        assert said.startswith(("mcstudy: scenario reference, front car: ", "mcstudy: models.soft"))
+        assert "scenario reference, front car: " in said or ": models.soft: " in said
     assert contents(finished.path) == before
 
 

@@ -60,6 +60,19 @@ def test_the_address_chooses_the_runs_between_two_values_and_picks_one(opened: A
     assert f"{SPEED[17]:.3g}" in page.inner_text("#picked")
 
 
+def test_values_of_many_runs_are_held_to_sixteen_bits(opened: Any) -> None:
+    rng = np.random.default_rng(3)
+    speed, huge = rng.uniform(5.0, 20.0, 6000), np.full(6000, 1e35)
+    speed[7] = np.nan
+    columns = [Column("speed", "speed [m/s]", speed), Column("huge", "huge [–]", huge)]
+    html = render_explorer("Many", np.arange(6000), ["ok"] * 6000, columns, ["speed"])
+    page = opened(html, "speed=10:12&run=17")
+    page.wait_for_selector(READY)
+    # Values at the ends may fall to either side.
+    assert chosen(page) == pytest.approx(((speed >= 10.0) & (speed <= 12.0)).sum(), abs=3)
+    assert f"{speed[17]:.3g}" in page.inner_text("#picked")
+
+
 def test_dragging_along_an_axis_chooses_and_a_double_click_takes_it_back(opened: Any) -> None:
     page = opened(explorer())
     page.wait_for_selector(READY)

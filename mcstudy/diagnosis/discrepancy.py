@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.fit import Fit, Slopes
+from mcstudy.diagnosis.fit import Fit
+from mcstudy.diagnosis.jacobian import Slopes
 from mcstudy.diagnosis.layout import Layout, Scatter
 from mcstudy.diagnosis.marginal import Marginal
 from mcstudy.diagnosis.normal_equations import Scores

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcstudy.diagnosis.discrepancy import Discrepancy, fit_discrepancy
-from mcstudy.diagnosis.fit import Fit, FitError, Slopes, expand_tests, fit, observe_tests
+from mcstudy.diagnosis.fit import Fit, FitError, fit
+from mcstudy.diagnosis.jacobian import Slopes, expand_tests, observe_tests
 from mcstudy.diagnosis.layout import Layout, Scatter
 from mcstudy.diagnosis.model_selection import settle
 from mcstudy.diagnosis.normal_equations import Scores

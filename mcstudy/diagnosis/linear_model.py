@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.fit import Slopes, expand_tests, observe_tests, simulate_slopes
+from mcstudy.diagnosis.jacobian import Slopes, expand_tests, observe_tests, simulate_slopes
 from mcstudy.diagnosis.layout import Layout, Scatter
 from mcstudy.diagnosis.normal_equations import NormalEquations, Scores
 from mcstudy.diagnosis.problem import Form, Problem

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from mcstudy.diagnosis.fit import Fit, fit, shared_names
+from mcstudy.diagnosis.fit import Fit, fit
+from mcstudy.diagnosis.jacobian import shared_names
 from mcstudy.diagnosis.layout import Layout, Scatter
 from mcstudy.diagnosis.linear_model import linearise, solve
 from mcstudy.diagnosis.normal_equations import Scores

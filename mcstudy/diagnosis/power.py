@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.fit import Fit, FitError, fit, observe_tests
+from mcstudy.diagnosis.fit import Fit, FitError, fit
+from mcstudy.diagnosis.jacobian import observe_tests
 from mcstudy.diagnosis.layout import Layout
 from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import (

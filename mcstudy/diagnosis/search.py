@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mcstudy.diagnosis.fit import Fit, fit, shared_names, start_scores
+from mcstudy.diagnosis.fit import Fit, fit, start_scores
+from mcstudy.diagnosis.jacobian import shared_names
 from mcstudy.diagnosis.layout import Layout, lay_out
 from mcstudy.diagnosis.model_selection import (
     DISTINCT,

@@ -6,15 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.fit import (
-    Fit,
-    FitError,
-    Slopes,
-    fit,
-    log_widening,
-    misfit_of,
-    observe_tests,
-)
+from mcstudy.diagnosis.fit import Fit, FitError, fit, log_widening, misfit_of
+from mcstudy.diagnosis.jacobian import Slopes, observe_tests
 from mcstudy.diagnosis.layout import Layout, Scatter
 from mcstudy.diagnosis.linear_model import Centre, solve
 from mcstudy.diagnosis.normal_equations import Scores

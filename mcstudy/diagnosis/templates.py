@@ -7,7 +7,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.fit import Fit, observe_tests
+from mcstudy.diagnosis.fit import Fit
+from mcstudy.diagnosis.jacobian import observe_tests
 from mcstudy.diagnosis.layout import Layout
 from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Cause, Form, Problem

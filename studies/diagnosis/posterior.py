@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from mcstudy.diagnosis.fit import Fit, form_latents
+from mcstudy.diagnosis.fit import Fit
+from mcstudy.diagnosis.jacobian import form_latents
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.statistics import REACH, Estimate
 from mcstudy.studyfile.input_space import value_at

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.special import logsumexp
 
-from mcstudy.diagnosis.fit import Fit, expand_tests, fit, observe_tests
+from mcstudy.diagnosis.fit import Fit, fit
+from mcstudy.diagnosis.jacobian import expand_tests, observe_tests
 from mcstudy.diagnosis.layout import Layout
 from mcstudy.diagnosis.model_selection import DISTINCT
 from mcstudy.diagnosis.normal_equations import NormalEquations, Scores

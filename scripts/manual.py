@@ -17,6 +17,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from joblib.externals.loky import get_reusable_executor
+
 from studies import cli
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -74,6 +76,8 @@ def run_page(page: str, folder: Path) -> None:
     """
     if not (folder / "configs").exists():
         (folder / "configs").symlink_to(ROOT / "configs")
+    # Workers that are still there look for files where they were started.
+    get_reusable_executor().shutdown(wait=True)
     namespace: dict[str, object] = {}
     with contextlib.chdir(folder):
         for block in blocks_of(page):

@@ -3,8 +3,6 @@
 Its peer is the same browser with an empty page that does nothing but ask for frames.
 """
 
-import importlib.util
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +13,6 @@ from mcstudy.report import Section, render
 from mcstudy.viewer import Column, Stored, render_explorer
 from models.registry import load_model
 from studies.viewing import pack_scene, view_runs
-
-BROWSER = Path(__file__).parent.parent / "viewer" / "conftest.py"
-_spec = importlib.util.spec_from_file_location("browser_fixtures", BROWSER)
-assert _spec is not None and _spec.loader is not None
-_fixtures = importlib.util.module_from_spec(_spec)
-sys.modules["browser_fixtures"] = _fixtures
-_spec.loader.exec_module(_fixtures)
-browser = _fixtures.browser
 
 COUNT = """async (seconds) => {
   let frames = 0; const end = performance.now() + 1000 * seconds;

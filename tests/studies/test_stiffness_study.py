@@ -326,7 +326,7 @@ def test_options_of_a_study_that_do_not_fit_are_user_errors(tmp_path: Path) -> N
         (curve, "{ corridor = 5.0 }\n\n"),
     ):
         path.write_text(STUDY.replace(old, new))
-        assert "mcstudy: model: " in told(mcstudy("run", path, "--out", tmp_path / "out"))
+        assert ": model: " in told(mcstudy("run", path, "--out", tmp_path / "out"))
     assert not (tmp_path / "out").exists()
 
 

@@ -1,27 +1,10 @@
-"""A browser that reports errors and requests, for the tests of pages."""
+"""Pages whose errors and requests are reported."""
 
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-ARGUMENTS = ["--no-sandbox", "--enable-unsafe-swiftshader"]
-READY = "body[data-ready='1']"
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
-    if CHROMIUM is None:
-        pytest.skip("no Chromium: apt install chromium")
-    playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: make install")
-    with playwright.sync_playwright() as driver:
-        found = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield found
-        found.close()
-
 
 Opener = Callable[..., Any]
 

@@ -59,6 +59,17 @@ def blocks_of(page: str) -> list[Block]:
     return found
 
 
+def figures_of(page: str) -> list[str]:
+    """Return the figures that a page shows, as places below the folder in which it is run.
+
+    Parameters
+    ----------
+    page : str
+        Name of the page.
+    """
+    return FIGURE.findall((DOCS / f"{page}.md").read_text(encoding="utf-8"))
+
+
 def run_page(page: str, folder: Path) -> None:
     """Run the blocks of a page.
 
@@ -158,8 +169,7 @@ def take_figures(folder: Path) -> None:
     target = DOCS / "_figures"
     shutil.rmtree(target, ignore_errors=True)
     for page in PAGES:
-        text = (DOCS / f"{page}.md").read_text(encoding="utf-8")
-        for name in FIGURE.findall(text):
+        for name in figures_of(page):
             (target / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(folder / name, target / name)
 

@@ -26,7 +26,7 @@ from studies.published_tables import PublishedTable
 from studies.reconstruction.schema import Reconstruction
 from studies.reconstruction.study import reconstruct, write_reconstruction
 from studies.reconstruction.variants import run_variants
-from studies.runs import columns_of, load_study_model
+from studies.runs import columns_of, load_study_model, run_again
 
 
 def results_folder(study: AnyStudy, out: Path | str | None = None) -> ResultsFolder:
@@ -163,4 +163,4 @@ def rerun(results: ResultsFolder, run: int) -> Run:
     row = runs[runs["run"] == run]
     if row.empty:
         raise UserError(f"{results.path}: has no run {run}, only 0 to {runs['run'].max()}")
-    return model.run({item.name: float(row[item.name].iloc[0]) for item in model.inputs})
+    return run_again(model, row.iloc[0])

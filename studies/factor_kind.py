@@ -57,9 +57,9 @@ class FactorKind(StudyKind[Study, RunPlan, ModelRuns, Analysis]):
         model = load_study_model(study)
         return ModelRuns(model, complete_blocks(folder, model))
 
-    def keep(self, study: Study, plan: RunPlan, folder: ResultsFolder) -> None:
+    def keep(self, study: Study, results: ModelRuns, folder: ResultsFolder) -> None:
         """Keep notable runs in three dimensions."""
-        keep_scenes(study, plan.model, complete_blocks(folder, plan.model), folder)
+        keep_scenes(study, results.model, results.runs, folder)
 
     def pages(self, study: Study, results: ModelRuns, folder: ResultsFolder) -> Mapping[str, str]:
         """Return the explorer of the runs."""

@@ -92,8 +92,9 @@ class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
         with folder.open_for_writing():
             folder.write_text("study.toml", text)
             self.execute(study, plan, folder, workers=workers, quiet=quiet)
-            self.keep(study, plan, folder)
-            return self.build_report(study, folder)
+            results = self.results(study, folder)
+            self.keep(study, results, folder)
+            return self._publish(study, results, folder)
 
     def build_report(self, study: Study, folder: ResultsFolder) -> Analysis:
         """Analyse a results folder and write its figures and report, without running the model.
@@ -112,7 +113,10 @@ class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
         StudyError
             If too many runs failed.
         """
-        results = self.results(study, folder)
+        return self._publish(study, self.results(study, folder), folder)
+
+    def _publish(self, study: Study, results: Results, folder: ResultsFolder) -> Analysis:
+        """Analyse results and write figures and report."""
         analysis = self.analyse(study, results)
         done = partial(Finished, study, results)
         shown = self.pages(study, results, folder)
@@ -165,17 +169,17 @@ class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
             No progress line.
         """
 
-    def keep(self, study: Study, plan: Plan, folder: ResultsFolder) -> None:
+    def keep(self, study: Study, results: Results, folder: ResultsFolder) -> None:
         """Keep what the report shows of single runs; nothing unless a kind has something.
 
         Parameters
         ----------
         study : AnyStudy
             Study file of the kind, checked.
-        plan : Plan
-            From ``plan``.
+        results : Results
+            From ``results``.
         folder : ResultsFolder
-            Open for writing; holds all runs.
+            Open for writing.
         """
 
     @abstractmethod

@@ -23,7 +23,7 @@ from mcstudy.sensitivity.blocks import MIN_BLOCKS
 from mcstudy.studyfile.identity import hash_of, numbers_digest
 from mcstudy.studyfile.schema import RUN_TIME, CommonStudy, SampledStudy
 from mcstudy.studyfile.study_outputs import report_outputs
-from models.protocol import Model, complete_status
+from models.protocol import Model, Run, complete_status
 from models.registry import load_model
 from studies import worker
 
@@ -91,6 +91,11 @@ class ModelRuns:
 
     model: Model
     runs: pd.DataFrame
+
+
+def run_again(model: Model, row: "pd.Series[Any]") -> Run:
+    """Return the run of a row of a table of runs, with histories and scene."""
+    return model.run({item.name: float(row[item.name]) for item in model.inputs})
 
 
 def load_study_model(study: CommonStudy) -> Model:

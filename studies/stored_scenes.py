@@ -17,6 +17,7 @@ from mcstudy.studyfile.schema import SampledStudy
 from mcstudy.studyfile.study_outputs import report_outputs
 from mcstudy.viewer.explorer import Stored
 from models.protocol import Model, complete_status
+from studies.runs import run_again
 from studies.viewing import pack_scene
 
 FOLDER, INDEX = "scenes", "scenes/index.json"
@@ -100,13 +101,12 @@ def keep_scenes(
         What is known of the accident.
     """
     notable = notable_runs(model, runs, report_outputs(study, model), measured)
-    names = [item.name for item in model.inputs]
     kept = {}
     for number, why in notable.items():
         name = f"{FOLDER}/run-{number:06d}.json"
         if not (folder.path / name).exists():
             row = runs[runs["run"] == number].iloc[0]
-            packed = pack_scene(f"run {number}", model.run({k: float(row[k]) for k in names}))
+            packed = pack_scene(f"run {number}", run_again(model, row))
             if packed is None:
                 continue
             folder.write_text(name, json.dumps(packed))

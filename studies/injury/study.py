@@ -96,11 +96,11 @@ class Injury(StudyKind[InjuryStudy, list[PreparedCell], InjuryResults, InjuryAna
         """
         run_cells(study, folder, plan, workers=workers, quiet=quiet)
 
-    def keep(self, study: InjuryStudy, plan: list[PreparedCell], folder: ResultsFolder) -> None:
+    def keep(self, study: InjuryStudy, results: InjuryResults, folder: ResultsFolder) -> None:
         """Keep notable runs of the reference in three dimensions."""
-        first = plan[0]
-        runs = cell_runs(folder, first.name, study.design.n, first.model)
-        keep_scenes(first.study, first.model, runs, cell_folder(folder, first.name))
+        cell = next(iter(cells_of(study)))
+        runs = cell_runs(folder, cell.name, study.design.n, results.model)
+        keep_scenes(cell.study, results.model, runs, cell_folder(folder, cell.name))
 
     def pages(
         self, study: InjuryStudy, results: InjuryResults, folder: ResultsFolder

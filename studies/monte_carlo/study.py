@@ -16,7 +16,7 @@ from studies.monte_carlo.analysis import MonteCarloAnalysis, analyse, marks_of
 from studies.monte_carlo.design import plan_design, run_design, runs_of_design
 from studies.monte_carlo.report import draw, sections_of, summarise
 from studies.monte_carlo.schema import MonteCarloStudy
-from studies.runs import ModelRuns, RunPlan, load_study_model
+from studies.runs import ModelRuns, RunPlan, load_study_model, run_again
 from studies.stored_scenes import Measured, keep_scenes
 
 Done = Finished[MonteCarloStudy, ModelRuns, MonteCarloAnalysis]
@@ -61,17 +61,17 @@ class MonteCarlo(StudyKind[MonteCarloStudy, RunPlan, ModelRuns, MonteCarloAnalys
         """
         run_design(study, plan, folder, workers=workers, quiet=quiet)
 
-    def keep(self, study: MonteCarloStudy, plan: RunPlan, folder: ResultsFolder) -> None:
+    def keep(self, study: MonteCarloStudy, results: ModelRuns, folder: ResultsFolder) -> None:
         """Keep the histories of the first runs, and notable runs in three dimensions."""
-        runs = runs_of_design(study, folder).runs
-        _keep_histories(study, plan.model, runs, folder)
+        model, runs = results.model, results.runs
+        _keep_histories(study, model, runs, folder)
         near = [
             Measured(output, mark.value, float(runs[output].std()) or 1.0)
-            for output, marks in marks_of(study, plan.model).items()
+            for output, marks in marks_of(study, model).items()
             for mark in marks
             if mark.kind == "observed"
         ]
-        keep_scenes(study, plan.model, runs, folder, near)
+        keep_scenes(study, model, runs, folder, near)
 
     def results(self, study: MonteCarloStudy, folder: ResultsFolder) -> ModelRuns:
         """Return the model and the runs of the design."""
@@ -118,8 +118,7 @@ def _keep_histories(
     study: MonteCarloStudy, model: Model, runs: pd.DataFrame, folder: ResultsFolder
 ) -> None:
     """Write the time histories of the study's first runs."""
-    names = [item.name for item in model.inputs]
     for k in range(min(study.report.histories, len(runs))):
         row = runs.iloc[k]
-        run = model.run({name: float(row[name]) for name in names})
+        run = run_again(model, row)
         folder.add_histories(int(row["run"]), run.histories)

@@ -66,14 +66,14 @@ class PosteriorOf(StudyKind[PosteriorStudy, RunPlan, ModelRuns, PosteriorAnalysi
         """
         run_design(study, plan, folder, workers=workers, quiet=quiet)
 
-    def keep(self, study: PosteriorStudy, plan: RunPlan, folder: ResultsFolder) -> None:
+    def keep(self, study: PosteriorStudy, results: ModelRuns, folder: ResultsFolder) -> None:
         """Keep notable runs in three dimensions, those nearest to the evidence first."""
         near = [
             Measured(item.name, item.value, item.sd)
-            for item in items_of(study, plan.model).values()
+            for item in items_of(study, results.model).values()
             if item.value is not None
         ]
-        keep_scenes(study, plan.model, runs_of_design(study, folder).runs, folder, near)
+        keep_scenes(study, results.model, results.runs, folder, near)
 
     def results(self, study: PosteriorStudy, folder: ResultsFolder) -> ModelRuns:
         """Return the model and the runs of the design."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from scripts.manual import DOCS, PAGES, ROOT, blocks_of, compare_output, run_page
+from scripts.manual import DOCS, PAGES, ROOT, blocks_of, compare_output, figures_of, run_page
 
 SLOW = tuple(page for page in PAGES if page not in ("first_study", "headform_corridors"))
 """Pages for the slow tier; `make docs` runs all of them."""
@@ -24,8 +24,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_what_a_page_says_works(page: str, folder: Path) -> None:
     assert any(block.language == "console" for block in blocks_of(page))
     run_page(page, folder)
-    text = (DOCS / f"{page}.md").read_text(encoding="utf-8")
-    figures = re.findall(r"\]\(_figures/([^)]+)\)", text)
+    figures = figures_of(page)
     assert figures
     for figure in figures:
         assert (folder / figure).exists(), figure

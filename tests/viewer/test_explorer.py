@@ -32,6 +32,14 @@ def explorer(*, stored: tuple[int, ...] = ()) -> str:
     )  # fmt: skip
 
 
+def matrix_of(page: Any) -> tuple[dict[str, float], float]:
+    """Return the scatter matrix's place in the window and the side of one of its two rows."""
+    matrix = page.locator("#matrix")
+    matrix.scroll_into_view_if_needed()
+    box = matrix.bounding_box()
+    return box, (min(box["width"], box["height"]) - 54) / 2
+
+
 def chosen(page: Any) -> int:
     return int(page.evaluate("document.body.dataset.chosen"))
 
@@ -94,10 +102,7 @@ def test_dragging_along_an_axis_chooses_and_a_double_click_takes_it_back(opened:
 def test_a_rectangle_in_a_plot_chooses_by_both_columns_and_status_filters(opened: Any) -> None:
     page = opened(explorer())
     page.wait_for_selector(READY)
-    matrix = page.locator("#matrix")
-    matrix.scroll_into_view_if_needed()
-    box = matrix.bounding_box()
-    size = (min(box["width"], box["height"]) - 54) / 2
+    box, size = matrix_of(page)
     # The plot of speed (up) against HIC15 (right), its left half.
     left, top = box["x"] + 54, box["y"] + size
     page.mouse.move(left + 1, top + 1)
@@ -115,10 +120,7 @@ def test_a_rectangle_in_a_plot_chooses_by_both_columns_and_status_filters(opened
 def test_a_click_picks_the_nearest_run(opened: Any) -> None:
     page = opened(explorer())
     page.wait_for_selector(READY)
-    matrix = page.locator("#matrix")
-    matrix.scroll_into_view_if_needed()
-    box = matrix.bounding_box()
-    size = (min(box["width"], box["height"]) - 54) / 2
+    box, size = matrix_of(page)
     top_run = int(np.nanargmax(HIC))
     low, high = np.nanmin(HIC), np.nanmax(HIC)
     x = box["x"] + 54 + (size - 6) * (HIC[top_run] - low) / (high - low)

@@ -118,6 +118,8 @@ class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
     def _publish(self, study: Study, results: Results, folder: ResultsFolder) -> Analysis:
         """Analyse results and write figures and report."""
         analysis = self.analyse(study, results)
+        for name, table in self.tables(analysis).items():
+            folder.write_text(name, table)
         done = partial(Finished, study, results)
         shown = self.pages(study, results, folder)
         return publish(
@@ -205,6 +207,16 @@ class StudyKind(ABC, Generic[Study, Plan, Results, Analysis]):
         results : Results
             From ``results``.
         """
+
+    def tables(self, analysis: Analysis) -> Mapping[str, str]:
+        """Return tables of comma-separated values by file name; none unless a kind has some.
+
+        Parameters
+        ----------
+        analysis : Analysis
+            From ``analyse``.
+        """
+        return {}
 
     @abstractmethod
     def subtitle(self, done: Finished[Study, Results, Analysis]) -> str:

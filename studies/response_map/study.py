@@ -81,27 +81,6 @@ class ResponseMap(StudyKind[MapStudy, RunPlan, ModelRuns, MapAnalysis]):
             replicate=plan.replicate, workers=workers, quiet=quiet,
         )  # fmt: skip
 
-    def build_report(self, study: MapStudy, folder: ResultsFolder) -> MapAnalysis:
-        """Write analysis, figures and report, and the points as a table of comma-separated values.
-
-        Parameters
-        ----------
-        study : MapStudy
-            As read from its folder.
-        folder : ResultsFolder
-            Results folder of the study.
-
-        Raises
-        ------
-        UserError
-            If the folder holds too few runs yet.
-        StudyError
-            If too many runs failed.
-        """
-        analysis = super().build_report(study, folder)
-        folder.write_text(TABLE, table_of(analysis))
-        return analysis
-
     def results(self, study: MapStudy, folder: ResultsFolder) -> ModelRuns:
         """Return the model and the runs of the draws that are whole."""
         model = load_study_model(study)
@@ -118,6 +97,10 @@ class ResponseMap(StudyKind[MapStudy, RunPlan, ModelRuns, MapAnalysis]):
     def analyse(self, study: MapStudy, results: ModelRuns) -> MapAnalysis:
         """Return every number that the report prints."""
         return analyse(study, results.model, results.runs)
+
+    def tables(self, analysis: MapAnalysis) -> dict[str, str]:
+        """Return the points as a table of comma-separated values."""
+        return {TABLE: table_of(analysis)}
 
     def subtitle(self, done: Done) -> str:
         """Return the line below the report's title."""

@@ -11,7 +11,6 @@ from models.contact.road import Road
 from models.crash.body_contact import apply_self_contacts
 from models.crash.car_contact import apply_car_contacts
 from models.crash.ellipsoids import Ellipsoids
-from models.crash.front import patch_count, separation_of
 from models.crash.record import GOES_ON, EndReason, HeadContact
 from models.crash.recorder import (
     limit_reason,
@@ -21,12 +20,11 @@ from models.crash.recorder import (
     time_at_rest,
     write_end,
 )
-from models.crash.stepping import HEAD_NEAR, head_meets_car
 from models.crash.surfaces import Contacts
 from models.planar.body import PlanarBody
 from models.planar.bushings import add_bushings
 from models.planar.joints import PlanarJoints
-from models.planar.recording import Memory, lands, note_landing, write_poses, write_row
+from models.planar.recording import Memory, note_landing, write_poses, write_row
 from models.planar.space import (
     ANGLE,
     FORCE_X,
@@ -41,13 +39,11 @@ from models.planar.space import (
     X,
     Z,
 )
+from models.planar.step_length import ticks_of_next_step
 from models.vehicle.motion import CarMotion, car_state
 from models.vehicle.zones import Zones
 
 Array = NDArray[np.float64]
-
-CLEAR = 0.1
-"""m ahead of the car from which a segment cannot meet it within the longest step (assumed)."""
 
 FASTEST = 1e3
 """Root mean square segment speed (m/s) beyond which a run has diverged (assumed)."""
@@ -249,37 +245,6 @@ def _add_joint_torques(body, table, state, ahead, given):
 
 
 @inlined_kernel
-def _head_is_near(model, data):
-    """Return whether the head is within ``HEAD_NEAR`` of the car's front."""
-    head, contacts = model.settings.head, data.contacts
-    x, z = contacts.centre[head, 0] - data.car[0], contacts.centre[head, 2]
-    for j in range(patch_count(model.front)):
-        found = separation_of(model.front, model.ellipsoids, contacts, j, head, x, 0.0, z, 1.0, 0.0)
-        if found[0] < HEAD_NEAR:
-            return True
-    return False
-
-
-@inlined_kernel
-def _ticks_of_next_step(model, data, landed):
-    settings, ellipsoids = model.settings, model.ellipsoids
-    car, motion, contacts = data.car, data.motion, data.contacts
-    if head_meets_car(settings.head, ellipsoids, model.front, car, motion, contacts) and (
-        _head_is_near(model, data)
-    ):
-        return 1
-    for j in range(contacts.zone_force.shape[0] - 1):
-        if contacts.zone_force[j] > 0.0:
-            return settings.coarse
-    if not landed and lands(settings, motion, contacts, 2.0 * settings.road * settings.tick, True):
-        return settings.coarse
-    for i in range(contacts.centre.shape[0]):
-        if contacts.centre[i, 0] - car[0] < ellipsoids.reach[i] + CLEAR:
-            return settings.flight
-    return settings.road
-
-
-@inlined_kernel
 def _apply_loads(model, data, ahead):
     """Write the loads of a step of ``ahead`` s, and every body's own velocity.
 
@@ -379,7 +344,7 @@ def simulate(step_space, each_body, model, data):
             break
         met = math.isfinite(data.head_contact[HeadContact.TIME])
         landed = memory[Memory.ROAD_TIME] < math.inf or not met
-        ticks = _ticks_of_next_step(model, data, landed)
+        ticks = ticks_of_next_step(model, data, time, landed)
         memory[Memory.TICKS] += ticks
         memory[Memory.STEPS] += 1.0
         _step(step_space, each_body, model, data, ticks * settings.tick)

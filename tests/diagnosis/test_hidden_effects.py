@@ -1,5 +1,6 @@
 """Effects hidden by another program must be found; the full tier: ``validate --diagnosis``."""
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -69,6 +70,24 @@ def test_generator_and_model_agree_on_effects(
     head = run.histories["head"]
     ours = np.interp(time, head.time, head.channels["acceleration_normal"])
     assert np.abs(ours - measured).max() < 0.02 * measured.max()
+
+
+def test_a_guide_that_rubs_slows_the_headform_both_ways_and_leaves_the_load_cell(
+    tmp_path: Path,
+) -> None:
+    lab = replace(QUIET, force=True, force_sd=0.0)
+    rubbing = Hidden("guide_friction", "", {"force": 100.0})
+    make_tests(tmp_path / "m", [rubbing], 1, lab, header_of=Laboratory(force=True))
+    data = load_measured(tmp_path / "m")
+    test = data.tests["test"].iloc[0]
+    time, head = data.signal(test, "head_acceleration", "g")
+    _, cell = data.signal(test, "hood_force", "N")
+    drag = 100.0 / 2.5 / 9.80665
+    before, contact = time < -0.001, (time > 0.001) & (time < 0.008)
+    np.testing.assert_allclose(head[before], drag, rtol=0.05)
+    np.testing.assert_allclose(cell[before], 0.0, atol=1.0)
+    np.testing.assert_allclose((head - cell / 2.5 / 9.80665)[contact], drag, rtol=0.05)
+    np.testing.assert_allclose(head[-10:], -drag, rtol=0.05)
 
 
 def test_what_is_hidden_depends_on_the_seed_alone() -> None:

@@ -84,6 +84,7 @@ FOREIGN: dict[str, list[Draw]] = {
         _one("rate_dependent_hood", "logarithmic", share=(0.004, 0.15)),
         _one("rate_dependent_hood", "ramped", damping=(8.0, 130.0), ramp=(0.004, 0.008)),
         _one("rate_dependent_hood", "fading", damping=(8.0, 130.0), end=(0.01, 0.03)),
+        _one("rate_dependent_hood", "dry", force=(40.0, 400.0)),
     ],
     "hood_inertia": [
         _one("hood_inertia", "local_spring", mass=(0.03, 0.8), spring=(2e6, 4e6),
@@ -117,7 +118,7 @@ OUTSIDE: list[Draw] = [
     _one("ringing", "", share=(0.02, 0.12), length=(0.008, 0.02)),
     _one("cable", "", size=(0.6, 4.0)),
     _one("rupture", "", depth=(0.015, 0.03), share=(0.05, 0.3)),
-    _one("guide_friction", "", force=(40.0, 400.0)),
+    _one("guide_friction", "", force=(5.0, 80.0)),
     _one("mount_resonance", "", frequency=(500.0, 900.0), damping_ratio=(0.05, 0.15)),
 ]
 CRASHES: dict[str, list[Draw]] = {

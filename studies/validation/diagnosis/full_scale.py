@@ -114,7 +114,7 @@ class _Counter:
 
 
 def run_crashes(trial: FullScaleTrial) -> FullScaleOutcome:
-    """Hide an effect in full-scale tests, diagnose them with the multibody model and assess it.
+    """Hide an effect in full-scale tests, diagnose them with the model of reality and assess it.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def run_crashes(trial: FullScaleTrial) -> FullScaleOutcome:
     hidden = draw_of(trial.seed, trial.cause, CRASHES)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "tests"
-        make_crashes(folder, hidden, trial.seed, model=trial.reality, stated="multibody")
+        make_crashes(folder, hidden, trial.seed, model=trial.reality)
         problem, _, choice = read_tests(folder)
         causes = causes_of(choice.name, choice.options)
         return _assess(trial, hidden, problem, causes)

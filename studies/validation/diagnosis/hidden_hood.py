@@ -33,12 +33,21 @@ class Impact:
     mass : of the headform, kg.
     end : of the contact, s.
     rebound : speed, m/s.
+    drag : of the guide on the headform, against its motion, N.
+    turn : when the headform turns, s.
     """
 
     force: Callable[[Array], Array]
     mass: float
     end: float
     rebound: float
+    drag: float = 0.0
+    turn: float = 0.0
+
+    def slowing(self, time: Array) -> Array:
+        """Return the acceleration against the way into the hood (m/s2), (n,)."""
+        guide = np.where(time < self.turn, self.drag, -self.drag)
+        return np.asarray((self.force(time) + guide) / self.mass)
 
 
 def find(hidden: Sequence[Hidden], name: str) -> Hidden | None:
@@ -70,7 +79,10 @@ def strike(
     inertia = find(hidden, "hood_inertia")
     if inertia is not None and inertia.form == "local_spring":
         return _strike_sprung(law, _unloading(hidden, lab), mass, speed, inertia.numbers)
-    return _strike(law, _unloading(hidden, lab), mass, speed, inertia)
+    # Outside the catalogue: the headform still rubs on its guide, in either direction.
+    guide = find(hidden, "guide_friction")
+    drag = 0.0 if guide is None else guide.numbers["force"]
+    return _strike(law, _unloading(hidden, lab), mass, speed, inertia, drag)
 
 
 def _loading(hidden: Sequence[Hidden], lab: Laboratory, scale: float, order: int) -> Law:
@@ -105,9 +117,6 @@ def _loading(hidden: Sequence[Hidden], lab: Laboratory, scale: float, order: int
         if (h := changes.get("ringing")) is not None:
             # Outside the catalogue: the panel rings as it is pushed in.
             force *= 1.0 + h.numbers["share"] * np.sin(2.0 * np.pi * depth / h.numbers["length"])
-        if (h := changes.get("guide_friction")) is not None:
-            # Outside the catalogue: the headform still rubs on its guide.
-            force += h.numbers["force"] * np.tanh(rate / 0.05) * min(1.0, depth / 0.002)
         return float(force)
 
     if (h := changes.get("skin_compliance")) is None:
@@ -172,6 +181,9 @@ def _rate_force(force: float, depth: float, rate: float, h: Hidden) -> float:
         return numbers["damping"] * rate * min(1.0, depth / 0.002) * left
     if h.form == "relative":
         return force * numbers["per_speed"] * rate
+    if h.form == "dry":
+        # Seams of the hood rub: the force hardly depends on how fast they do.
+        return float(numbers["force"] * np.tanh(rate / 0.05) * min(1.0, depth / 0.002))
     if h.form == "logarithmic":
         return float(force * numbers["share"] * np.log1p(rate / 0.5))
     return float(force * numbers["share"] * (rate / 8.0) ** numbers["exponent"])
@@ -224,7 +236,12 @@ class _Event:
 
 
 def _strike(
-    law: Law, unloading: _Unloading, mass: float, speed: float, inertia: Hidden | None
+    law: Law,
+    unloading: _Unloading,
+    mass: float,
+    speed: float,
+    inertia: Hidden | None,
+    drag: float,
 ) -> Impact:
     options: Any = {"rtol": 1e-9, "atol": 1e-10, "max_step": 1e-4, "dense_output": True}
 
@@ -240,7 +257,7 @@ def _strike(
 
     def slowing(depth: float, rate: float) -> float:
         carried, growth = moved(depth)
-        return (law(depth, rate) + growth * rate * rate) / (mass + carried)
+        return (law(depth, rate) + drag + growth * rate * rate) / (mass + carried)
 
     def into(_t: float, y: Array) -> list[float]:
         return [y[1], -slowing(y[0], y[1])]
@@ -253,7 +270,7 @@ def _strike(
     heavy = mass + moved(deepest)[0]
 
     def out(_t: float, y: Array) -> list[float]:
-        return [y[1], -unloading.force(top, deepest, y[0]) / heavy]
+        return [y[1], (drag - unloading.force(top, deepest, y[0])) / heavy]
 
     parting = deepest - top / unloading.slope(top, deepest)
     parted = _Event(lambda y: float(y[0] - parting))
@@ -269,13 +286,13 @@ def _strike(
         for k, t in enumerate(time):
             if 0.0 <= t <= turn:
                 depth, rate = map(float, into_hood(float(t)))
-                found[k] = mass * slowing(depth, rate)
+                found[k] = mass * slowing(depth, rate) - drag
             elif turn < t <= end:
                 depth = float(out_of_hood(float(t))[0])
                 found[k] = mass * unloading.force(top, deepest, depth) / heavy
         return found
 
-    return Impact(force, mass, end, rebound)
+    return Impact(force, mass, end, rebound, drag, turn)
 
 
 def _strike_sprung(

@@ -217,7 +217,7 @@ class Layout:
         return self._of_signal(signal, values)
 
     def factor(self, signal: str, order: int, seen: Observation, scores: Array) -> Array:
-        """Return the product of one simulated signal and a cosine over its pulse, whitened (n,).
+        """Return the response of one simulated signal times a cosine over its pulse, whitened (n,).
 
         The cosine goes on as it ends beyond the pulse, as the repeatability does: a change that all
         tests share must not look like one of each test.
@@ -234,11 +234,11 @@ class Layout:
             Latents of the test's nuisances.
         """
         origin = self.shift + TIME_ORIGIN * scores[len(self.test.doubtful)]
-        time, shape = seen.signals[signal]
+        time, response = seen.response(signal)
 
         def values(channel: Signal, phase: Array) -> Array:
             wave = np.cos(np.pi * order * np.clip(phase, 0.0, 1.0))
-            return np.asarray(wave * np.interp(channel.time - origin, time, shape))
+            return np.asarray(wave * np.interp(channel.time - origin, time, response))
 
         return self._of_signal(signal, values)
 
@@ -333,9 +333,13 @@ class Layout:
             for k, signal in enumerate(test.signals):
                 time, values = seen.signals[signal.name]
                 shape = np.interp(signal.time - origin, time, values)
+                # What scatters is the acceleration that is felt, before the sensor reads it.
+                response = shape
+                if signal.name in seen.responses:
+                    response = np.interp(signal.time - origin, *seen.response(signal.name))
                 modes = self._modes[k]
                 factor = 1.0 + modes @ pulse
-                simulated = shape * factor + signal.sd * offsets[k]
+                simulated = shape + response * (modes @ pulse) + signal.sd * offsets[k]
                 given = signal.values if measured else 0.0
                 parts.append(
                     _whiten((given - simulated)[:, None], signal.sd, signal.correlation)[:, 0]
@@ -344,7 +348,7 @@ class Layout:
                     table = np.zeros((signal.time.size, own))
                     table[:, 0] = -TIME_ORIGIN * np.gradient(shape, signal.time) * factor
                     table[:, 1 + k] = signal.sd
-                    table[:, 1 + signals : 1 + signals + MODES] = sizes * modes * shape[:, None]
+                    table[:, 1 + signals : 1 + signals + MODES] = sizes * modes * response[:, None]
                     slopes.append(_whiten(table, signal.sd, signal.correlation))
         column = own - sum(scalar.scatters for scalar in test.scalars)
         factors = seen.widening if wide is None else wide

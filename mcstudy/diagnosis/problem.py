@@ -211,12 +211,19 @@ class Observation:
     """Outputs of a simulated test: (time, values) by signal, values by scalar.
 
     ``widening`` holds the factors on the standard deviation of scalars that scatter more, or less,
-    than the measured data state, by name.
+    than the measured data state, by name; ``responses`` the change of a signal per relative change
+    of what the sensor felt, by name, where the signal is not proportional to that.
     """
 
     signals: Mapping[str, tuple[Array, Array]]
     scalars: Mapping[str, float]
     widening: Mapping[str, float] = field(default_factory=dict)
+    responses: Mapping[str, Array] = field(default_factory=dict)
+
+    def response(self, signal: str) -> tuple[Array, Array]:
+        """Return times and change of a signal per relative change of what its sensor felt."""
+        time, values = self.signals[signal]
+        return time, self.responses.get(signal, values)
 
 
 class Simulate(Protocol):

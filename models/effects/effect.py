@@ -120,6 +120,8 @@ class Effect:
         Source of its form and numbers.
     apply : callable
         Maps the subject of the stage and the parameters by name to the changed subject.
+    nonlinear : bool
+        Whether a reading with the effect is not proportional to the true acceleration.
     """
 
     name: str
@@ -135,6 +137,7 @@ class Effect:
     separated_by: str
     source: str
     apply: Callable[[Any, Mapping[str, float]], Any]
+    nonlinear: bool = False
 
     def input_name(self, parameter: str) -> str:
         """Return the name that a parameter has among a model's inputs."""

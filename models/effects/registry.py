@@ -76,6 +76,7 @@ def load_effect(name: str) -> Effect:
         separated_by=row["separated_by"],
         source=row["source"],
         apply=import_module(f"models.effects.{name}").apply,
+        nonlinear=bool(row.get("nonlinear", False)),
     )
 
 

@@ -3,10 +3,21 @@
 from collections.abc import Collection, Mapping
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mcstudy.diagnosis.problem import Observation
 from models.criteria.filters import filter_cfc
-from models.protocol import Channel, Model, complete_status
+from models.effects.registry import load_effect
+from models.protocol import Channel, Model, Run, complete_status
 from models.registry import load_model
+
+Array = NDArray[np.float64]
+
+ACCELERATION, GAIN = "head_acceleration", "sensor_gain_factor"
+"""Signal that the effects on readings change, and the input that scales what its sensor feels."""
+STEP = 0.005
+"""Relative change of it in a finite difference."""
 
 
 def channel_units(model: Model, names: Collection[str]) -> dict[str, str]:
@@ -94,6 +105,21 @@ class Simulation:
         run = model.observe(values, seen, self._scalars)
         if run.status not in complete_status(model):
             return None
+        scalars = {name: run.outputs[name] for name in self._scalars}
+        signals = self._signals(model, run)
+        nonlinear = any(load_effect(name).nonlinear for name in {*self._effects, *effects})
+        if not (nonlinear and ACCELERATION in signals):
+            return Observation(signals, scalars)
+        # A gain acts on what the sensor feels.
+        amplified = self.model({*effects, "sensor_gain"})
+        usual = next(i.nominal for i in amplified.inputs if i.name == GAIN)
+        values[GAIN] = (1.0 + STEP) * values.get(GAIN, usual)
+        more = self._signals(amplified, amplified.observe(values, seen, ()))
+        response = (more[ACCELERATION][1] - signals[ACCELERATION][1]) / STEP
+        return Observation(signals, scalars, responses={ACCELERATION: response})
+
+    def _signals(self, model: Model, run: Run) -> dict[str, tuple[Array, Array]]:
+        """Return time and values of the measured signals of a run."""
         signals = {}
         for name, channel_class in self._filters.items():
             group, _, channel = self._seen_as(name, run.inputs).partition("_")
@@ -105,4 +131,4 @@ class Simulation:
                 rate = 1.0 / float(history.time[1] - history.time[0])
                 signal = filter_cfc(signal, rate, channel_class)
             signals[name] = (history.time, signal)
-        return Observation(signals, {name: run.outputs[name] for name in self._scalars})
+        return signals

@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 SHARED_STEP, OWN_STEP = 0.05, 0.5
 """Steps of finite differences, in latents: of shared values and of a test's own nuisances."""
+ROUGH_STEP = 0.3
+"""The first of them where the model jumps between neighbouring inputs."""
 CHANGE, STEP_RANGE = 30.0, (0.01, 0.3)
 """Norm of the whitened change of the data over which a shared value is differentiated once its
 column is known, and bounds of the step."""
@@ -211,13 +213,14 @@ def simulate_slopes(
         )
     )
     shared = [np.zeros((residual.size, scores.shared.size)) for residual in residuals]
+    rough = any(np.any(layout.roughness) for layout in layouts)
     there_already = 0
     if known:
         there_already = known.shared[0].shape[1]
         for table, kept in zip(shared, known.shared, strict=True):
             table[:, :there_already] = kept
     for k in range(there_already, scores.shared.size):
-        size = SHARED_STEP
+        size = ROUGH_STEP if rough else SHARED_STEP
         if sizes is not None and sizes[k] > 0.0:
             size = float(np.clip(CHANGE / sizes[k], *STEP_RANGE))
         ends = []
@@ -235,8 +238,8 @@ def simulate_slopes(
             continue
         # One-sided where the other side does not run.
         (high, above), (low, below) = ends if len(ends) == 2 else (ends[0], (0.0, residuals))
-        for table, upper, lower in zip(shared, above, below, strict=True):
-            table[:, k] = (lower - upper) / (high - low)
+        for layout, table, upper, lower in zip(layouts, shared, above, below, strict=True):
+            table[:, k] = _without_jumps(layout, (lower - upper) / (high - low), high - low)
     return Slopes(tuple(doubtful), tuple(shared))
 
 
@@ -258,7 +261,22 @@ def _doubtful(
                 moved[k] += step
                 there = _observe(problem, common, layout, moved)
                 if there is not None:
-                    table[:, k] = (residual - layout.residual(there, moved, scatter)) / step
+                    slope = (residual - layout.residual(there, moved, scatter)) / step
+                    table[:, k] = _without_jumps(layout, slope, step)
                     break
         tables.append(table)
     return tuple(tables)
+
+
+def _without_jumps(layout: Layout, slope: Array, step: float) -> Array:
+    """Return a slope (n,) shrunk where it may be a jump of the model over a step.
+
+    The factor is that of a value that is known with an error (W. James, C. Stein, 4th Berkeley
+    Symposium, 1961, positive part, for each value alone).
+    """
+    error = np.sqrt(2.0) * layout.roughness / step
+    if not np.any(error):
+        return slope
+    with np.errstate(divide="ignore", invalid="ignore"):
+        kept = np.maximum(0.0, 1.0 - (error / slope) ** 2)
+    return np.where(error > 0.0, np.nan_to_num(kept) * slope, slope)

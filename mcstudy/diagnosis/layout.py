@@ -91,6 +91,13 @@ class Layout:
         return scatter.sizes(MODES if self.test.signals else 0, scalars)
 
     @functools.cached_property
+    def roughness(self) -> Array:
+        """Jumps (n,) of the whitened simulated vector between neighbouring inputs."""
+        samples = sum(signal.time.size for signal in self.test.signals)
+        own = [s.roughness / s.sd if s.roughness > 0.0 else 0.0 for s in self.test.scalars]
+        return np.concatenate([np.zeros(samples), own])
+
+    @functools.cached_property
     def _modes(self) -> tuple[Array, ...]:
         """The smooth factors (n, MODES) at the times of each signal."""
         return tuple(self.modes(signal.time) for signal in self.test.signals)

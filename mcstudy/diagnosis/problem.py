@@ -47,12 +47,14 @@ class Scalar:
     value : as measured.
     sd : standard uncertainty, infinite if missing.
     scatters : whether it also has a test-to-test repeatability.
+    roughness : part of ``sd`` that is due to jumps of the model between neighbouring inputs.
     """
 
     name: str
     value: float
     sd: float
     scatters: bool = True
+    roughness: float = 0.0
 
 
 @dataclass(frozen=True)

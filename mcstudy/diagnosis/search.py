@@ -19,6 +19,7 @@ from mcstudy.diagnosis.model_selection import (
     rescale,
 )
 from mcstudy.diagnosis.problem import Cause, Problem
+from mcstudy.diagnosis.roughness import measure_roughness, widen
 from mcstudy.diagnosis.screening import (
     LEVEL,
     Screening,
@@ -149,14 +150,16 @@ def fit_base(problem: Problem) -> tuple[tuple[Layout, ...], Fit]:
     UserError
         If the model cannot simulate one of the tests.
     """
-    layouts = []
+    nominal = {}
     for test in problem.tests:
         inputs = dict(test.inputs)
         inputs |= {u.name: value_at(u.prior, 0.0) for u in problem.unknowns}
         seen = problem.simulate(inputs, {})
         if seen is None:
             raise UserError(f"test {test.name!r}: the model fails at its recorded inputs")
-        layouts.append(lay_out(test, seen))
+        nominal[test.name] = seen
+    roughness = measure_roughness(problem, nominal) if problem.dear else {}
+    layouts = [lay_out(widen(test, roughness), nominal[test.name]) for test in problem.tests]
     found = fit(problem, layouts, (), start_scores(layouts, len(problem.unknowns)), SCAN)
     for _ in range(2):
         scatter = estimate_scatter(found, layouts, smooth_discrepancy(layouts, found))

@@ -29,6 +29,9 @@ from studies.validation.diagnosis.trial import read_tests
 
 FIRST = 20_000
 """First seed."""
+REALITIES = ("multibody", "planar")
+"""Models that stand for reality, each diagnosed with itself: two that share no solver."""
+HEADS = ("hidden", "right", "size within 95 %", "runs", "s on one core", "answers")
 GROUPS = 2
 """Groups of collections, each with surfaces of its own."""
 
@@ -158,19 +161,24 @@ def run_accidents(trials: Sequence[FullScaleTrial], study_file: Path) -> list[Fu
     return outcomes
 
 
-def plan_full_scale(causes: Sequence[str], sets: int, first: int) -> list[FullScaleTrial]:
+def plan_full_scale(
+    causes: Sequence[str], sets: int, first: int, realities: Sequence[str] = REALITIES[:1]
+) -> list[FullScaleTrial]:
     """Return trials of each cause, with seeds of their own.
 
     Parameters
     ----------
     causes : sequence of str
     sets : int
-        Number of sets of each cause.
+        Number of sets of each cause and reality.
     first : int
         First seed.
+    realities : sequence of str
+        Models that stand for reality.
     """
     return [
-        FullScaleTrial(first + sets * i + k, cause)
+        FullScaleTrial(first + sets * i + k, cause, reality)
+        for reality in realities
         for i, cause in enumerate(causes)
         for k in range(sets)
     ]
@@ -252,7 +260,7 @@ def validate_full_scale(
         Processes, -1 for one a core.
     """
     crashes, accidents = run_full_scale(
-        plan_full_scale(list(CRASHES), sets, FIRST),
+        plan_full_scale(list(CRASHES), sets, FIRST, REALITIES),
         plan_full_scale(list(ACCIDENTS), sets, FIRST),
         study_file,
         workers,
@@ -277,30 +285,34 @@ def summarise(analysis: Mapping[str, Any]) -> list[Table]:
     analysis : mapping
         From ``validate_full_scale``.
     """
-    titles = {
-        "crashes": "Full-scale tests: multibody crashes, five tests a set.",
-        "accidents": "Collections of sixty accidents.",
+    parts = {
+        f"Full-scale tests: {reality} crashes, five tests a set.": [
+            row for row in analysis["crashes"] if row["trial"]["reality"] == reality
+        ]
+        for reality in REALITIES
     }
-    tables = []
-    for key, title in titles.items():
-        rows = []
-        for cause in dict.fromkeys(row["trial"]["cause"] for row in analysis[key]):
-            part = [row for row in analysis[key] if row["trial"]["cause"] == cause]
-            covered = [row["covered"] for row in part if row["covered"] is not None]
-            answers = Counter(
-                "adequate" if row["cause"] is None else " + ".join(row["named"]) or row["cause"]
-                for row in part
-            )
-            rows.append(
-                [
-                    cause,
-                    f"{sum(row['right'] for row in part)} of {len(part)}",
-                    f"{sum(covered)} of {len(covered)}",
-                    number(float(np.median([row["runs"] for row in part]))),
-                    number(float(np.median([row["seconds"] for row in part]))),
-                    ", ".join(f"{name} ({count})" for name, count in answers.most_common()),
-                ]
-            )
-        heads = ["hidden", "right", "size within 95 %", "runs", "s on one core", "answers"]
-        tables.append(Table(title, heads, rows))
-    return tables
+    parts["Collections of sixty accidents."] = analysis["accidents"]
+    return [Table(title, HEADS, _answers(part)) for title, part in parts.items()]
+
+
+def _answers(rows: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """Return the rows of the table of answers, one a hidden cause."""
+    found = []
+    for cause in dict.fromkeys(row["trial"]["cause"] for row in rows):
+        part = [row for row in rows if row["trial"]["cause"] == cause]
+        covered = [row["covered"] for row in part if row["covered"] is not None]
+        answers = Counter(
+            "adequate" if row["cause"] is None else " + ".join(row["named"]) or row["cause"]
+            for row in part
+        )
+        found.append(
+            [
+                cause,
+                f"{sum(row['right'] for row in part)} of {len(part)}",
+                f"{sum(covered)} of {len(covered)}",
+                number(float(np.median([row["runs"] for row in part]))),
+                number(float(np.median([row["seconds"] for row in part]))),
+                ", ".join(f"{name} ({count})" for name, count in answers.most_common()),
+            ]
+        )
+    return found

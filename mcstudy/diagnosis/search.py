@@ -28,7 +28,7 @@ from mcstudy.diagnosis.screening import (
     score_templates,
     screen,
 )
-from mcstudy.diagnosis.survey import SCAN
+from mcstudy.diagnosis.survey import FAR, SCAN, weight_of
 from mcstudy.diagnosis.templates import (
     Template,
     cause_templates,
@@ -160,10 +160,15 @@ def fit_base(problem: Problem) -> tuple[tuple[Layout, ...], Fit]:
         nominal[test.name] = seen
     roughness = measure_roughness(problem, nominal) if problem.dear else {}
     layouts = [lay_out(widen(test, roughness), nominal[test.name]) for test in problem.tests]
-    found = fit(problem, layouts, (), start_scores(layouts, len(problem.unknowns)), SCAN)
+    start = start_scores(layouts, len(problem.unknowns))
+    found = fit(problem, layouts, (), start, SCAN, exact=not problem.dear)
+    samples = sum(residual.size for residual in found.residuals)
+    # A model that is far from its tests need not be fitted to the end.
+    exact = not problem.dear or weight_of(samples, found.misfit) >= FAR
     for _ in range(2):
         scatter = estimate_scatter(found, layouts, smooth_discrepancy(layouts, found))
-        found = fit(problem, layouts, (), rescale(layouts, found, scatter), scatter)
+        start = rescale(layouts, found, scatter)
+        found = fit(problem, layouts, (), start, scatter, exact=exact)
     return tuple(layouts), found
 
 

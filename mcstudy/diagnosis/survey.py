@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -193,13 +194,19 @@ def survey(
         return None
     best.sort(key=lambda entry: entry.cost)
     rest.sort(key=lambda entry: entry.cost)
+    cheapest = best[0].cost
+    if weight >= FAR and not problem.dear:
+        # Nuisances that took a misfit on mislead the linear model: runs decide between the starts.
+        confirm = partial(_confirm, problem, layouts, (*forms, form), scatter, weight)
+        ranked = sorted(best + rest, key=lambda entry: confirm(entry)[0])
+        best, rest = ranked[:1], ranked[1:]
     starts = tuple(
         _better(problem, layouts, (*forms, form), scatter, weight, entry)
         for entry in best
         if entry.cost < RIVAL_START * best[0].cost
     )
     # Steps of the grid are too large for a small effect in data of little noise.
-    reached = min(best[0].cost, expected) if weight >= FAR else best[0].cost
+    reached = min(cheapest, expected) if weight >= FAR else cheapest
     promise = max(lowest - expected, 0.0)
     spare = tuple(rest[:SPARE])
     return Survey(form, scatter, weight, times * reached, times * promise, starts, spare)
@@ -217,11 +224,23 @@ def _better(
 
     It does where a parameter lies near the end of its range, or the move is a long one.
     """
+    return _confirm(problem, layouts, forms, scatter, weight, tried)[1], tried.slopes
+
+
+def _confirm(
+    problem: Problem,
+    layouts: Sequence[Layout],
+    forms: tuple[Form, ...],
+    scatter: Scatter,
+    weight: float,
+    tried: _Trial,
+) -> tuple[float, Scores]:
+    """Return the misfit by runs at a start, moved or not, whichever is better, and the start."""
     found = []
     for scores in (tried.moved, tried.still):
         seen = observe_tests(problem, forms, layouts, scores)
         found.append(np.inf if seen is None else misfit_of(layouts, seen, scores, scatter, weight))
-    return (tried.moved if found[0] <= found[1] else tried.still), tried.slopes
+    return min(found), tried.moved if found[0] <= found[1] else tried.still
 
 
 def _spread(layouts: Sequence[Layout]) -> list[int]:

@@ -16,9 +16,9 @@ from models.contact.headform import HeadformContact
 
 REACH, KNOTS = 4.0, 33
 """Penetration over the depth up to which mass is picked up, and places of its table."""
-PLACES = (0.0, 0.002, 0.005, 0.01, 0.02)
+PLACES = (0.0, 0.002, 0.004, 0.006, 0.008, 0.01, 0.012, 0.015, 0.02)
 """Penetrations (m) of the weights of the free form: 1 at the first, 0 at the last."""
-WEIGHTS = ("at_2_mm", "at_5_mm", "at_10_mm")
+WEIGHTS = tuple(f"at_{round(1000 * place)}_mm" for place in PLACES[1:-1])
 
 
 def apply(contact: HeadformContact, parameters: Mapping[str, float]) -> HeadformContact:

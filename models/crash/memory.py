@@ -1,14 +1,22 @@
 """Crashes kept for runs that differ only in how the signals were recorded."""
 
+import itertools
 from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 from models.crash.outcome import Raw
 from models.effects.chain import EffectChain
 
 MOST = 64
-"""Crashes kept, some 2 MB each: those of one Jacobian of about ten tests."""
+"""Crashes kept in a process, some 2 MB each: those of one Jacobian of about ten tests."""
+
+_Key = tuple[int, tuple[float, ...]]
+_KEPT: OrderedDict[_Key, Raw | str] = OrderedDict()
+"""Crashes of all models by number of the model and inputs, the latest last: a search holds dozens
+of models, each with an effect of its own."""
+_NUMBERS = itertools.count()
 
 
 class CrashMemory:
@@ -30,7 +38,11 @@ class CrashMemory:
             if effect.stage == "signal"
             for name in effect.parameters
         }
-        self._kept: OrderedDict[tuple[float, ...], Raw | str] = OrderedDict()
+        self._number = next(_NUMBERS)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take a number of this process: that of another one may be another model's here."""
+        self.__dict__.update(state, _number=next(_NUMBERS))
 
     def recall(self, values: Mapping[str, float]) -> Raw | str | None:
         """Return the crash of these inputs with their record, or None if it is not kept.
@@ -43,10 +55,10 @@ class CrashMemory:
         if not self._recorded:
             return None
         key = self._key(values)
-        found = self._kept.get(key)
+        found = _KEPT.get(key)
         if found is None:
             return None
-        self._kept.move_to_end(key)
+        _KEPT.move_to_end(key)
         return found if isinstance(found, str) else replace(found, values=values)
 
     def keep(self, values: Mapping[str, float], crash: Raw | str) -> None:
@@ -64,9 +76,10 @@ class CrashMemory:
             return
         if not isinstance(crash, str):
             crash = replace(crash, record=crash.record.copy(), frames=crash.frames.copy())
-        self._kept[self._key(values)] = crash
-        if len(self._kept) > MOST:
-            self._kept.popitem(last=False)
+        _KEPT[self._key(values)] = crash
+        if len(_KEPT) > MOST:
+            _KEPT.popitem(last=False)
 
-    def _key(self, values: Mapping[str, float]) -> tuple[float, ...]:
-        return tuple(value for name, value in values.items() if name not in self._recorded)
+    def _key(self, values: Mapping[str, float]) -> _Key:
+        acting = (value for name, value in values.items() if name not in self._recorded)
+        return self._number, tuple(acting)

@@ -1,8 +1,13 @@
 """Crashes that differ only in how they were recorded are stepped once."""
 
+import gc
+import pickle
+
 import pytest
 
+from models.crash.memory import MOST, CrashMemory
 from models.crash.outcome import Raw
+from models.effects.chain import build_chain
 from models.multibody.model import MultibodyModel
 from models.protocol import Run
 from models.registry import load_model
@@ -56,3 +61,21 @@ def test_a_crash_is_kept_while_others_run(name: str) -> None:
     model.observe({"impact_speed": 12.0}, SEEN, OUTPUTS)
     again = model.observe({"impact_speed": 8.0, factor: 1.0}, SEEN, OUTPUTS)
     assert first.outputs == again.outputs
+
+
+def test_many_models_keep_no_more_crashes_than_one() -> None:
+    """A search holds a model for each effect; each of its own kept 128 MB of crashes."""
+    models = [load_model("planar", {}, {"sensor_gain": {}, "sensor_offset": {}}) for _ in range(3)]
+    gc.collect()
+    for k in range(2 * MOST // 3):
+        for model in models:
+            model.observe({"impact_speed": 9.0 + 0.01 * k}, SEEN, ())
+    held = [entry for entry in gc.get_objects() if isinstance(entry, Raw)]
+    assert len(held) <= MOST + 1
+
+
+def test_a_model_from_another_process_recalls_no_crash_of_a_model_here() -> None:
+    here = CrashMemory(build_chain("planar", {"sensor_gain": {}}))
+    here.keep({"impact_speed": 9.0}, "no_contact")
+    assert here.recall({"impact_speed": 9.0}) == "no_contact"
+    assert pickle.loads(pickle.dumps(here)).recall({"impact_speed": 9.0}) is None

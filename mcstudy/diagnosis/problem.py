@@ -249,3 +249,7 @@ class Problem:
     simulate: Simulate
     ranges: Mapping[str, tuple[float, float]]
     dear: bool = False
+
+    def nominal_inputs(self, test: Test) -> dict[str, float]:
+        """Return the inputs of a test as recorded, and the medians of the unknowns."""
+        return dict(test.inputs) | {u.name: value_at(u.prior, 0.0) for u in self.unknowns}

@@ -19,7 +19,7 @@ NEGLIGIBLE = 0.1
 
 
 def measure_roughness(problem: Problem, nominal: Mapping[str, Observation]) -> dict[str, float]:
-    """Return the standard deviation of the jumps of each scalar, zero where it is negligible.
+    """Return the standard deviation of the jumps of each scalar, by name.
 
     The second difference of a smooth output over half a standard deviation of what is uncertain is
     small; of independent jumps its variance is six times theirs.
@@ -46,8 +46,7 @@ def measure_roughness(problem: Problem, nominal: Mapping[str, Observation]) -> d
 
 def _neighbours(problem: Problem, test: Test) -> list[list[dict[str, float]]]:
     """Return pairs of inputs on both sides of a test's, one for each value that is uncertain."""
-    inputs = dict(test.inputs)
-    inputs |= {u.name: value_at(u.prior, 0.0) for u in problem.unknowns}
+    inputs = problem.nominal_inputs(test)
     pairs = []
     for name, sd in test.doubtful.items():
         low, high = problem.ranges[name]

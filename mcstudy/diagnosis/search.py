@@ -39,7 +39,6 @@ from mcstudy.diagnosis.templates import (
 )
 from mcstudy.diagnosis.trends import add_trends
 from mcstudy.errors import UserError
-from mcstudy.studyfile.input_space import value_at
 
 WIDENING = 2.0
 """Log units of evidence for each of misfit that remains within which causes are indistinguishable
@@ -152,9 +151,7 @@ def fit_base(problem: Problem) -> tuple[tuple[Layout, ...], Fit]:
     """
     nominal = {}
     for test in problem.tests:
-        inputs = dict(test.inputs)
-        inputs |= {u.name: value_at(u.prior, 0.0) for u in problem.unknowns}
-        seen = problem.simulate(inputs, {})
+        seen = problem.simulate(problem.nominal_inputs(test), {})
         if seen is None:
             raise UserError(f"test {test.name!r}: the model fails at its recorded inputs")
         nominal[test.name] = seen

@@ -195,13 +195,13 @@ def survey(
     best.sort(key=lambda entry: entry.cost)
     rest.sort(key=lambda entry: entry.cost)
     cheapest = best[0].cost
+    confirm = partial(_confirm, problem, layouts, (*forms, form), scatter, weight)
     if weight >= FAR and not problem.dear:
         # Nuisances that took a misfit on mislead the linear model: runs decide between the starts.
-        confirm = partial(_confirm, problem, layouts, (*forms, form), scatter, weight)
         ranked = sorted(best + rest, key=lambda entry: confirm(entry)[0])
         best, rest = ranked[:1], ranked[1:]
     starts = tuple(
-        _better(problem, layouts, (*forms, form), scatter, weight, entry)
+        (confirm(entry)[1], entry.slopes)
         for entry in best
         if entry.cost < RIVAL_START * best[0].cost
     )
@@ -212,21 +212,6 @@ def survey(
     return Survey(form, scatter, weight, times * reached, times * promise, starts, spare)
 
 
-def _better(
-    problem: Problem,
-    layouts: Sequence[Layout],
-    forms: tuple[Form, ...],
-    scatter: Scatter,
-    weight: float,
-    tried: _Trial,
-) -> tuple[Scores, Slopes]:
-    """Return the latents moved by the linear model, or those before where it leads astray.
-
-    It does where a parameter lies near the end of its range, or the move is a long one.
-    """
-    return _confirm(problem, layouts, forms, scatter, weight, tried)[1], tried.slopes
-
-
 def _confirm(
     problem: Problem,
     layouts: Sequence[Layout],
@@ -235,7 +220,10 @@ def _confirm(
     weight: float,
     tried: _Trial,
 ) -> tuple[float, Scores]:
-    """Return the misfit by runs at a start, moved or not, whichever is better, and the start."""
+    """Return the misfit by runs at a start, and the start: as moved by the linear model or before.
+
+    The model leads astray where a parameter lies near the end of its range, or the move is long.
+    """
     found = []
     for scores in (tried.moved, tried.still):
         seen = observe_tests(problem, forms, layouts, scores)
@@ -331,8 +319,8 @@ def approach(
     for tried in () if surveyed.far else surveyed.spare:
         if best is not None and best.misfit <= enough:
             break
-        start, slopes = _better(problem, layouts, forms, surveyed.scatter, surveyed.weight, tried)
-        found = _come_near(problem, layouts, forms, surveyed, start, slopes)
+        _, start = _confirm(problem, layouts, forms, surveyed.scatter, surveyed.weight, tried)
+        found = _come_near(problem, layouts, forms, surveyed, start, tried.slopes)
         if found is not None and (best is None or found.log_evidence > best.log_evidence):
             best = found
     return best

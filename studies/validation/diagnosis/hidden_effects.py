@@ -64,7 +64,8 @@ def make_tests(
         phase = rng.uniform(0.0, 6.28)
         share = 1.0 + level + wave * np.sin(np.pi * time / max(time[-1], 1e-9) + phase)
         force = impact.force(time) * share
-        felt = read(hidden, impact.slowing(time) / GRAVITY * share, time, progress)
+        slowing = (force + impact.guide(time) * share) / (impact.mass * GRAVITY)
+        felt = read(hidden, slowing, time, progress)
         shown = filtered(felt, lab.rate, hidden) + rng.normal(0.0, lab.noise_sd, time.size)
         columns = {"time": clock(hidden, time), "head_acceleration": shown}
         if lab.force:

@@ -44,10 +44,9 @@ class Impact:
     drag: float = 0.0
     turn: float = 0.0
 
-    def slowing(self, time: Array) -> Array:
-        """Return the acceleration against the way into the hood (m/s2), (n,)."""
-        guide = np.where(time < self.turn, self.drag, -self.drag)
-        return np.asarray((self.force(time) + guide) / self.mass)
+    def guide(self, time: Array) -> Array:
+        """Return the force of the guide against the way into the hood (N), (n,)."""
+        return np.where(time < self.turn, self.drag, -self.drag)
 
 
 def find(hidden: Sequence[Hidden], name: str) -> Hidden | None:

@@ -59,6 +59,7 @@ def test_the_crash_has_the_crash_effects() -> None:
     ("effects", "inputs"),
     [
         ({"speed_bias": {"factor": 1.05}}, {"impact_speed": 9.45}),
+        ({"speed_bias": {"factor": 1.0, "offset": -0.3}}, {"impact_speed": 8.7}),
         ({"mass_error": {"factor": 1.1}}, {"headform_mass": 2.75}),
         ({"hood_force_scale": {"factor": 1.3}}, {"hood_force_scale": 1.3}),
         ({"sensor_filter": {"channel_class": 180.0}}, {"channel_class": 180.0}),

@@ -69,7 +69,10 @@ CATALOGUE: dict[str, list[Draw]] = {
     "sensor_saturation": [_one("sensor_saturation", "catalogue", limit=(80.0, 165.0))],
     "sensor_filter": [_one("sensor_filter", "catalogue", channel_class=(100.0, 900.0))],
     "time_scale": [_factor("time_scale", 0.005, 0.1)],
-    "speed_bias": [_factor("speed_bias", 0.006, 0.12)],
+    "speed_bias": [
+        _factor("speed_bias", 0.006, 0.12),
+        _one("speed_bias", "offset", "offset", offset=(0.08, 0.8)),
+    ],
     "mass_error": [_factor("mass_error", 0.005, 0.23)],
 }
 FOREIGN: dict[str, list[Draw]] = {
@@ -110,7 +113,7 @@ FOREIGN: dict[str, list[Draw]] = {
         _one("sensor_filter", "forward", channel_class=(80.0, 500.0)),
     ],
     "speed_bias": [
-        _one("speed_bias", "offset", "offset", offset=(0.08, 0.8)),
+        _one("speed_bias", "falling", height=(0.03, 0.4)),
         _one("speed_bias", "drifting", "change", change=(0.02, 0.12)),
     ],
 }  # fmt: skip

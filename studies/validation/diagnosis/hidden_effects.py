@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 from studies.validation.diagnosis.hidden_hood import strike
 from studies.validation.diagnosis.hidden_instrument import clock, filtered, read, recorded_speed
-from studies.validation.diagnosis.laboratory import Hidden, Laboratory
+from studies.validation.diagnosis.laboratory import GRAVITY, Hidden, Laboratory
 
 Array = NDArray[np.float64]
 
-GRAVITY = 9.80665
 LEAD, TAIL = 0.004, 0.006
 """s that are recorded before and after the contact."""
 

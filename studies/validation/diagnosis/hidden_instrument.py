@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from studies.validation.diagnosis.hidden_hood import find
-from studies.validation.diagnosis.laboratory import Hidden
+from studies.validation.diagnosis.laboratory import GRAVITY, Hidden
 
 Array = NDArray[np.float64]
 
@@ -166,6 +166,9 @@ def recorded_speed(hidden: Sequence[Hidden], speed: float, progress: float) -> f
         return speed
     if h.form == "offset":
         return speed - h.numbers["offset"]
+    if h.form == "falling":
+        # The gates lie above the hood: the headform goes on to fall.
+        return float(np.sqrt(speed**2 - 2.0 * GRAVITY * h.numbers["height"]))
     if h.form == "drifting":
         return speed / (1.0 + h.numbers["change"] * progress)
     return speed / h.numbers["factor"]

@@ -5,6 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+GRAVITY = 9.80665
+"""m/s^2 (BIPM, SI Brochure, the standard value)."""
+
 Knots = tuple[tuple[float, float], ...]
 
 CURVE: Knots = ((0.0, 0.0), (0.015, 2600.0), (0.055, 3600.0), (0.1, 5200.0))

@@ -249,6 +249,8 @@ class Run:
     histories : mapping of str to History
         By group.
     scene : Scene, optional
+    recalled : bool
+        Whether a crash that was kept was recorded anew, not stepped.
     """
 
     inputs: Mapping[str, float]
@@ -257,6 +259,7 @@ class Run:
     outputs: Mapping[str, float]
     histories: Mapping[str, History] = field(default_factory=dict)
     scene: Scene | None = None
+    recalled: bool = False
 
 
 @dataclass(frozen=True)

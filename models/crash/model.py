@@ -2,7 +2,8 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,6 +94,7 @@ class CrashModel(ABC):
                     f"{option} must lie within 0 and {outcome.HIGHEST_CLASS:g}, given {value}"
                 )
         self.vehicle: Vehicle = load_vehicle(vehicle)
+        self._car = (vehicle, hood_curve and tuple(tuple(knot) for knot in hood_curve))
         if hood_curve is not None:
             self.vehicle = self.vehicle.with_curve(HOOD, hood_curve)
         self.tick = float(tick)
@@ -108,6 +110,11 @@ class CrashModel(ABC):
     def inputs(self) -> tuple[Input, ...]:
         """Inputs in order."""
         return self._own_inputs + self._chain.inputs
+
+    @property
+    def _setup(self) -> tuple[Hashable, ...]:
+        """Options on which a crash depends beside its inputs."""
+        return (type(self), self.version, self._car, self.tick, self.classes)
 
     def run(self, inputs: Mapping[str, float]) -> Run:
         """Run once, with time histories and scene.
@@ -143,12 +150,12 @@ class CrashModel(ABC):
             If an input is unknown or outside its range.
         """
         values = complete_inputs(self, inputs)
-        raw = self._memory.recall(values) if self.repeatable else None
-        if raw is None:
-            raw = self._simulate(values)
-            if self.repeatable:
-                self._memory.keep(values, raw)
-        return self._run(values, raw, outputs, channels, scene=False)
+        kept = self._memory.recall(self._setup, values) if self.repeatable else None
+        raw = self._simulate(values) if kept is None else kept
+        if self.repeatable and kept is None:
+            self._memory.keep(self._setup, values, raw)
+        run = self._run(values, raw, outputs, channels, scene=False)
+        return replace(run, recalled=kept is not None)
 
     def reached(self) -> float:
         """Return the time (s) that the run under way has reached; 0 for a model of quick runs."""

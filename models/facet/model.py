@@ -1,7 +1,7 @@
 """The facet crash model behind the model protocol."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,6 +113,10 @@ class FacetModel(MultibodyModel):
         self.mesh = car.mesh
         self._field = self._field_of(car.mesh)
         self._found = empty_findings(len(self.vehicle.zones))
+
+    @property
+    def _setup(self) -> tuple[Hashable, ...]:
+        return (*super()._setup, *self._subdivisions, self._bare, *self._distributed)
 
     def front_of(self, scenario: Scenario) -> FacetFront:
         """Return the front of facets of a scenario."""

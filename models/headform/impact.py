@@ -103,9 +103,13 @@ def _at(table, x):
     last = table.shape[0] - 1
     if x >= table[last, 0]:
         return table[last, 1], 0.0
-    k = 1
-    while x > table[k, 0]:
-        k += 1
+    low, k = 0, last
+    while k - low > 1:
+        middle = (low + k) // 2
+        if x > table[middle, 0]:
+            low = middle
+        else:
+            k = middle
     slope = (table[k, 1] - table[k - 1, 1]) / (table[k, 0] - table[k - 1, 0])
     return table[k - 1, 1] + slope * (x - table[k - 1, 0]), slope
 
@@ -189,8 +193,8 @@ def strike(impactor, surface, laws, count, rate, slide, step, stride, record, su
         force = hood_force(surface, laws, count, depth, rate, deepest)
         if surface.pickup.shape[0] > 1:
             # Mass of the hood reaches the headform's speed when it is picked up, and keeps it.
-            growth, _ = _at(surface.pickup, max(deepest, 0.0))
             if rate > 0.0 and depth >= deepest:
+                growth, _ = _at(surface.pickup, max(deepest, 0.0))
                 moved += 0.5 * (last_growth + growth) * (depth - last_deepest)
                 last_growth, last_deepest = growth, depth
                 force += growth * rate * rate

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 ACCELERATION, GAIN = "head_acceleration", "sensor_gain_factor"
 """Signal that the effects on readings change, and the input that scales what its sensor feels."""
+PLAIN = Channel()
+"""Of a channel that the model declares nothing about."""
 STEP = 0.005
 """Relative change of it in a finite difference."""
 
@@ -47,6 +49,11 @@ class Simulation:
         Measured outputs.
     effects : mapping, optional
         Effects switched on from the start, with their parameters.
+
+    Attributes
+    ----------
+    stepped : int
+        Runs whose crash was stepped, not recalled.
     """
 
     def __init__(
@@ -61,6 +68,7 @@ class Simulation:
         self._filters, self._scalars = dict(filters), tuple(scalars)
         self._effects = {k: dict(v) for k, v in (effects or {}).items()}
         self._models: dict[tuple[str, ...], Model] = {}
+        self.stepped = 0
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the models out: a worker loads its own in milliseconds."""
@@ -79,7 +87,7 @@ class Simulation:
 
         In a straight impact one axis is measured, with its sign: an offset may be negative.
         """
-        channel = self.model(()).channels.get(name, Channel())
+        channel = self.model(()).channels.get(name, PLAIN)
         straight = channel.straight and inputs.get("impact_angle", 0.0) == 0.0
         return channel.straight if straight else name
 
@@ -103,6 +111,7 @@ class Simulation:
             values |= {f"{cause}_{name}": value for name, value in parameters.items()}
         seen = {self._seen_as(name, values) for name in self._filters}
         run = model.observe(values, seen, self._scalars)
+        self.stepped += not run.recalled
         if run.status not in complete_status(model):
             return None
         scalars = {name: run.outputs[name] for name in self._scalars}
@@ -126,7 +135,7 @@ class Simulation:
             history = run.histories[group]
             signal = history.channels[channel]
             # Channels that the model filters already have the measured class.
-            filtered = model.channels.get(name, Channel()).filter_option
+            filtered = model.channels.get(name, PLAIN).filter_option
             if channel_class > 0.0 and not filtered:
                 rate = 1.0 / float(history.time[1] - history.time[0])
                 signal = filter_cfc(signal, rate, channel_class)

@@ -1,7 +1,6 @@
 """Crashes that differ only in how they were recorded are stepped once."""
 
 import gc
-import pickle
 
 import pytest
 
@@ -21,7 +20,7 @@ class _Counting(MultibodyModel):
     loops = 0
 
     def _step(self, values: dict[str, float]) -> Raw | None:
-        self.loops += 1
+        _Counting.loops += 1
         return super()._step(values)
 
 
@@ -30,26 +29,29 @@ def _observe(model: MultibodyModel, speed: float, factor: float) -> Run:
 
 
 def test_sizes_of_a_sensor_error_share_a_crash_and_nothing_else_does() -> None:
+    _Counting.loops = 0
     model = _Counting(effects={"sensor_gain": {}})
     runs = [(9.0, 1.0), (9.5, 1.0), (9.0, 1.1), (9.5, 0.9), (9.0, 1.0)]
     seen = [_observe(model, *pair) for pair in runs]
-    assert model.loops == 2
+    assert _Counting.loops == 2
+    assert [run.recalled for run in seen] == [False, False, True, True, True]
     for (speed, factor), run in zip(runs, seen, strict=True):
-        # A new model has nothing to recall.
-        alone = _observe(MultibodyModel(effects={"sensor_gain": {}}), speed, factor)
-        assert run.outputs == alone.outputs
+        inputs = {"impact_speed": speed, "sensor_gain_factor": factor}
+        alone = MultibodyModel(effects={"sensor_gain": {}}).run(inputs)
+        assert run.outputs == {name: alone.outputs[name] for name in OUTPUTS}
         assert run.inputs == alone.inputs
         found, true = (r.histories["head"].channels["acceleration"] for r in (run, alone))
         assert (found == true).all()
 
 
 def test_effects_on_the_crash_are_stepped_anew() -> None:
+    _Counting.loops = 0
     model = _Counting(effects={"hood_bottoming": {}})
     sizes = (model._chain.inputs[0].nominal, model._chain.inputs[0].high)
     outcomes = [
         model.observe({model._chain.inputs[0].name: size}, SEEN, OUTPUTS).outputs for size in sizes
     ]
-    assert model.loops == 2
+    assert _Counting.loops == 2
     assert outcomes[0] != outcomes[1]
 
 
@@ -74,8 +76,36 @@ def test_many_models_keep_no_more_crashes_than_one() -> None:
     assert len(held) <= MOST + 1
 
 
-def test_a_model_from_another_process_recalls_no_crash_of_a_model_here() -> None:
-    here = CrashMemory(build_chain("planar", {"sensor_gain": {}}))
-    here.keep({"impact_speed": 9.0}, "no_contact")
-    assert here.recall({"impact_speed": 9.0}) == "no_contact"
-    assert pickle.loads(pickle.dumps(here)).recall({"impact_speed": 9.0}) is None
+def test_models_that_differ_in_the_instrument_share_a_crash_and_others_do_not() -> None:
+    _Counting.loops = 0
+    loud = _Counting(effects={"sensor_gain": {"factor": 1.1}})
+    clipped = _Counting(effects={"sensor_saturation": {"limit": 60.0}})
+    plain = _Counting()
+    seen = [
+        model.observe({"impact_speed": 9.25}, SEEN, OUTPUTS) for model in (loud, clipped, plain)
+    ]
+    assert _Counting.loops == 1
+    apart = [
+        load_model("multibody", {}, effects).observe({"impact_speed": 9.25}, SEEN, OUTPUTS).outputs
+        for effects in (
+            {"sensor_gain": {"factor": 1.1}},
+            {"sensor_saturation": {"limit": 60.0}},
+            {},
+        )
+    ]
+    assert [run.outputs for run in seen] == apart
+    assert apart[0] != apart[1] != apart[2]
+    stiff = _Counting(hood_curve=[[0.0, 0.0], [0.05, 9000.0]])
+    filtered = _Counting(channel_class=180.0)
+    others = [m.observe({"impact_speed": 9.25}, SEEN, OUTPUTS).outputs for m in (stiff, filtered)]
+    assert others[0]["hic15"] != apart[2]["hic15"] != others[1]["hic15"]
+
+
+def test_a_recalled_crash_is_recorded_by_the_instrument_of_the_run() -> None:
+    setup, values = ("a car",), {"impact_speed": 9.0}
+    CrashMemory(build_chain("planar", {})).keep(setup, values, "no_contact")
+    loud = CrashMemory(build_chain("planar", {"sensor_gain": {}}))
+    assert loud.recall(setup, values | {"sensor_gain_factor": 1.2}) == "no_contact"
+    assert loud.recall(("another car",), values) is None
+    stiff = CrashMemory(build_chain("planar", {"hood_bottoming": {}}))
+    assert stiff.recall(setup, values | {"hood_bottoming_clearance": 0.04}) is None

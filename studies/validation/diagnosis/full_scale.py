@@ -20,6 +20,7 @@ from mcstudy.text import number
 from studies.diagnosis.accidents import Surfaces, fit_surfaces
 from studies.diagnosis.causes import accident_causes_of, causes_of
 from studies.diagnosis.posterior import describe
+from studies.diagnosis.simulation import Simulation
 from studies.publishing import publish
 from studies.validation.diagnosis.drawing import ACCIDENTS, CRASHES, draw_of
 from studies.validation.diagnosis.hidden_accidents import make_accidents
@@ -76,7 +77,7 @@ class FullScaleOutcome:
         Whether the 95 % intervals of the named cause hold the true numbers, if the hidden cause was
         named first.
     runs : int
-        Model runs of the search; of surfaces for accidents.
+        Crashes that the search stepped; of surfaces for accidents, their evaluations.
     seconds : float
         Of the search.
     why : str
@@ -129,7 +130,10 @@ def run_crashes(trial: FullScaleTrial) -> FullScaleOutcome:
         make_crashes(folder, hidden, trial.seed, model=trial.reality)
         problem, _, choice = read_tests(folder)
         causes = causes_of(choice.name, choice.options)
-        return _assess(trial, hidden, problem, causes)
+        simulation = problem.simulate
+        assert isinstance(simulation, Simulation)
+        outcome = _assess(trial, hidden, problem, causes)
+        return replace(outcome, runs=simulation.stepped)
 
 
 def run_accidents(trials: Sequence[FullScaleTrial], study_file: Path) -> list[FullScaleOutcome]:

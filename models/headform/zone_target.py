@@ -4,6 +4,7 @@ import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +54,21 @@ LEFT = 0.005
 """s without contact after which a headform has left a part of the hood that moves on its own."""
 
 
+MOTION = frozenset({"impact_speed", "impact_angle"})
+"""Inputs that do not change what is struck."""
+
+
+class _Hood(NamedTuple):
+    """What is struck: its law, number of knots, steps per sample, contact, and part with mass."""
+
+    laws: Array
+    knots: int
+    stride: int
+    surface: Surface
+    part: Part | None
+    unloading_ratio: float
+
+
 class ZoneTarget:
     """A plane struck by a headform.
 
@@ -84,6 +100,7 @@ class ZoneTarget:
         zone: str,
     ) -> None:
         self._skin = skin
+        self._last: tuple[tuple[float, ...], _Hood] | None = None
         self._curve: ForceCurve | None = None
         self._corridor: Corridor | None = None
         self.digest = ""
@@ -142,6 +159,37 @@ class ZoneTarget:
         impactor : Impactor
             The headform.
         """
+        hood = self._hood(values, chain, impactor.mass)
+        stride = hood.stride
+        speed, angle = values["impact_speed"], values["impact_angle"]
+        speeds = (speed * math.cos(angle), speed * math.sin(angle))
+        record = np.empty((round(LONGEST_CONTACT * SAMPLING_RATE), COLUMNS))
+        summary = np.zeros(SUMMARY)
+        if hood.part is not None:
+            strike_part(
+                impactor, hood.surface, hood.part, hood.laws, hood.knots, *speeds,
+                1.0 / (SAMPLING_RATE * stride), stride, LEFT, record, summary,
+            )  # fmt: skip
+        else:
+            strike(
+                impactor, hood.surface, hood.laws, hood.knots, *speeds,
+                1.0 / (SAMPLING_RATE * stride), stride, record, summary,
+            )  # fmt: skip
+        kept = record[: int(summary[SAMPLES])].copy()
+        dent = float(interpolate_law(hood.laws, 0, hood.knots, SURFACE, summary[DEEPEST]))
+        return Strike(
+            speeds=speeds,
+            record=kept,
+            summary=summary,
+            force=kept[:, NORMAL : TANGENTIAL + 1],
+            dent=(dent, dent * (1.0 - 1.0 / hood.unloading_ratio)),
+        )
+
+    def _hood(self, values: Mapping[str, float], chain: EffectChain, mass: float) -> _Hood:
+        """Return what is struck, that of the last impact where only the speed is another."""
+        key = (mass, *(value for name, value in values.items() if name not in MOTION))
+        if self._last is not None and self._last[0] == key:
+            return self._last[1]
         curve = self.hood_curve(values, chain)
         contact = chain.act(
             "contact",
@@ -154,38 +202,20 @@ class ZoneTarget:
         skin = skin_of(self._skin, contact, float(curve.force[-1]))
         count = write_law(curve, skin, laws[0])
         stiffest = stiffest_slope(curve.penetration, curve.force, curve.unloading_ratio)
-        stride = steps_per_sample(stiffest, contact.damping, impactor.mass)
-        speed, angle = values["impact_speed"], values["impact_angle"]
-        speeds = (speed * math.cos(angle), speed * math.sin(angle))
-        record = np.empty((round(LONGEST_CONTACT * SAMPLING_RATE), COLUMNS))
-        summary = np.zeros(SUMMARY)
+        stride = steps_per_sample(stiffest, contact.damping, mass)
+        part = None
+        if contact.part_mass > 0.0:
+            part = Part(contact.part_mass, contact.part_stiffness, contact.part_damping)
+            # Its damping tapers in, so that the frequency alone decides.
+            stride = max(stride, steps_per_sample(part.stiffness, 0.0, part.mass))
         surface = Surface(
             contact.friction, contact.damping, contact.onset, contact.rate_share,
             contact.rate_exponent, contact.rate_force, contact.pickup,
             curve.unloading_growth, curve.unloading_curvature,
         )  # fmt: skip
-        if contact.part_mass > 0.0:
-            part = Part(contact.part_mass, contact.part_stiffness, contact.part_damping)
-            # Its damping tapers in, so that the frequency alone decides.
-            stride = max(stride, steps_per_sample(part.stiffness, 0.0, part.mass))
-            strike_part(
-                impactor, surface, part, laws, count, *speeds,
-                1.0 / (SAMPLING_RATE * stride), stride, LEFT, record, summary,
-            )  # fmt: skip
-        else:
-            strike(
-                impactor, surface, laws, count, *speeds,
-                1.0 / (SAMPLING_RATE * stride), stride, record, summary,
-            )  # fmt: skip
-        kept = record[: int(summary[SAMPLES])].copy()
-        hood = float(interpolate_law(laws, 0, count, SURFACE, summary[DEEPEST]))
-        return Strike(
-            speeds=speeds,
-            record=kept,
-            summary=summary,
-            force=kept[:, NORMAL : TANGENTIAL + 1],
-            dent=(hood, hood * (1.0 - 1.0 / curve.unloading_ratio)),
-        )
+        built = _Hood(laws, count, stride, surface, part, curve.unloading_ratio)
+        self._last = (key, built)
+        return built
 
 
 def _curve_of(knots: Sequence[Sequence[float]]) -> ForceCurve:

@@ -209,9 +209,10 @@ def test_rates_count_what_they_say() -> None:
     assert rates["outside_unexplained"] == 0.5
     assert rates["pair_both"] == 1.0
     # The median of the sizes, all of one class.
-    (power,) = found["power"]
+    power, pairs = found["power"]
     assert (power["kind"], power["size"], power["trials"]) == ("own form", 3.0, 3)
     assert power["named"]["value"] == pytest.approx(2.0 / 3.0)
+    assert (pairs["kind"], pairs["named"]["value"]) == ("pair", 1.0)
     assert found["confusion"]["sensor_gain"] == {"sensor_gain": 1, "speed_bias": 1}
     assert found["confusion"]["nothing"] == {"adequate": 1, "sensor_gain": 1}
 

@@ -198,8 +198,8 @@ def simulate_slopes(
         Norms of the shared columns, as far as known: the differences are taken over changes of the
         data of one size, so that confounded values err alike.
     central : bool
-        Whether the differences in shared latents are central: one-sided ones give confounded
-        values, which change the same data, a difference that is not there.
+        Whether the differences are central: one-sided ones give confounded values, which change
+        the same data, a difference that is not there.
     """
     residuals = [
         layout.residual(observation, own, scatter)
@@ -209,7 +209,13 @@ def simulate_slopes(
         known.doubtful
         if known
         else _doubtful(
-            problem, _common(problem, forms, scores.shared), layouts, scores, residuals, scatter
+            problem,
+            _common(problem, forms, scores.shared),
+            layouts,
+            scores,
+            residuals,
+            scatter,
+            central=central,
         )
     )
     shared = [np.zeros((residual.size, scores.shared.size)) for residual in residuals]
@@ -234,12 +240,9 @@ def simulate_slopes(
                 ends.append((step, found))
                 if not central:
                     break
-        if not ends:
-            continue
-        # One-sided where the other side does not run.
-        (high, above), (low, below) = ends if len(ends) == 2 else (ends[0], (0.0, residuals))
-        for layout, table, upper, lower in zip(layouts, shared, above, below, strict=True):
-            table[:, k] = _without_jumps(layout, (lower - upper) / (high - low), high - low)
+        for i, (layout, table) in enumerate(zip(layouts, shared, strict=True)):
+            own_ends = [(step, found[i]) for step, found in ends]
+            table[:, k] = _difference(layout, own_ends, residuals[i])
     return Slopes(tuple(doubtful), tuple(shared))
 
 
@@ -250,22 +253,34 @@ def _doubtful(
     scores: Scores,
     residuals: Sequence[Array],
     scatter: Scatter,
+    *,
+    central: bool,
 ) -> tuple[Array, ...]:
     """Return the Jacobians in the inputs that are recorded with an uncertainty."""
     tables = []
     for layout, own, residual in zip(layouts, scores.own, residuals, strict=True):
         table = np.zeros((residual.size, len(layout.test.doubtful)))
         for k in range(table.shape[1]):
+            ends = []
             for step in (OWN_STEP, -OWN_STEP):
                 moved = own.copy()
                 moved[k] += step
                 there = _observe(problem, common, layout, moved)
                 if there is not None:
-                    slope = (residual - layout.residual(there, moved, scatter)) / step
-                    table[:, k] = _without_jumps(layout, slope, step)
-                    break
+                    ends.append((step, layout.residual(there, moved, scatter)))
+                    if not central:
+                        break
+            table[:, k] = _difference(layout, ends, residual)
         tables.append(table)
     return tuple(tables)
+
+
+def _difference(layout: Layout, ends: Sequence[tuple[float, Array]], here: Array) -> Array:
+    """Return the slope (n,) between residuals at two steps, one-sided where only one side runs."""
+    if not ends:
+        return np.zeros_like(here)
+    (high, above), (low, below) = ends if len(ends) == 2 else (ends[0], (0.0, here))
+    return _without_jumps(layout, (below - above) / (high - low), abs(high - low))
 
 
 def _without_jumps(layout: Layout, slope: Array, step: float) -> Array:

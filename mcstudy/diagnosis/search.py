@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mcstudy.diagnosis.fit import Fit, fit, start_scores
+from mcstudy.diagnosis.base_model import fit_base
+from mcstudy.diagnosis.fit import Fit
 from mcstudy.diagnosis.jacobian import shared_names
-from mcstudy.diagnosis.layout import Layout, lay_out
+from mcstudy.diagnosis.layout import Layout
 from mcstudy.diagnosis.model_selection import (
     DISTINCT,
     MAX_SHARE,
@@ -16,19 +17,15 @@ from mcstudy.diagnosis.model_selection import (
     Remainder,
     examine,
     rank_causes,
-    rescale,
 )
 from mcstudy.diagnosis.problem import Cause, Problem
-from mcstudy.diagnosis.roughness import measure_roughness, widen
 from mcstudy.diagnosis.screening import (
     LEVEL,
     Screening,
-    estimate_scatter,
     is_at_bound,
     score_templates,
     screen,
 )
-from mcstudy.diagnosis.survey import FAR, SCAN, weight_of
 from mcstudy.diagnosis.templates import (
     Template,
     cause_templates,
@@ -38,7 +35,6 @@ from mcstudy.diagnosis.templates import (
     smooth_discrepancy,
 )
 from mcstudy.diagnosis.trends import add_trends
-from mcstudy.errors import UserError
 
 WIDENING = 2.0
 """Log units of evidence for each of misfit that remains within which causes are indistinguishable
@@ -139,34 +135,6 @@ def names_of(
     if cause is None or cause == UNEXPLAINED:
         return ()
     return (*(ambiguous or (cause,)), *(second_ambiguous or ((second,) if second else ())))
-
-
-def fit_base(problem: Problem) -> tuple[tuple[Layout, ...], Fit]:
-    """Return the layouts of the tests and the fit of the base model.
-
-    Raises
-    ------
-    UserError
-        If the model cannot simulate one of the tests.
-    """
-    nominal = {}
-    for test in problem.tests:
-        seen = problem.simulate(problem.nominal_inputs(test), {})
-        if seen is None:
-            raise UserError(f"test {test.name!r}: the model fails at its recorded inputs")
-        nominal[test.name] = seen
-    roughness = measure_roughness(problem, nominal) if problem.dear else {}
-    layouts = [lay_out(widen(test, roughness), nominal[test.name]) for test in problem.tests]
-    start = start_scores(layouts, len(problem.unknowns))
-    found = fit(problem, layouts, (), start, SCAN, exact=not problem.dear)
-    samples = sum(residual.size for residual in found.residuals)
-    # A model that is far from its tests need not be fitted to the end.
-    exact = not problem.dear or weight_of(samples, found.misfit) >= FAR
-    for _ in range(2):
-        scatter = estimate_scatter(found, layouts, smooth_discrepancy(layouts, found))
-        start = rescale(layouts, found, scatter)
-        found = fit(problem, layouts, (), start, scatter, exact=exact)
-    return tuple(layouts), found
 
 
 def search(

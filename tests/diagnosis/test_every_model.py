@@ -6,9 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from mcstudy.diagnosis.base_model import fit_base
 from mcstudy.diagnosis.problem import Cause
 from mcstudy.diagnosis.screening import score_templates
-from mcstudy.diagnosis.search import fit_base, search
+from mcstudy.diagnosis.search import search
 from mcstudy.diagnosis.templates import cause_templates, named_forms
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.measurement.isomme import write_test

@@ -9,13 +9,14 @@ from linear_tests import BUMP, Linear, make_problem
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
+from mcstudy.diagnosis.base_model import fit_base
 from mcstudy.diagnosis.fit import Fit, fit, start_scores
 from mcstudy.diagnosis.layout import Layout, Scatter, lay_out
 from mcstudy.diagnosis.marginal import Marginal, log_bayes_factor, quadratic_form
 from mcstudy.diagnosis.model_selection import examine, rank_causes, settle
 from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Observation, Problem, Scalar, Signal, Test
-from mcstudy.diagnosis.search import UNEXPLAINED, fit_base, search
+from mcstudy.diagnosis.search import UNEXPLAINED, search
 
 SCATTER = Scatter(0.01, 0.003)
 
@@ -90,6 +91,34 @@ def test_scores_and_information_of_shapes_are_those_of_the_whole_covariance(fitt
     determinant = np.linalg.slogdet(np.eye(whole.size) + table @ table.T)[1]
     exact = -0.5 * (whole @ inverse @ whole + determinant)
     assert reduced.log_likelihood[0] - 0.5 * whole @ whole == pytest.approx(exact, abs=1e-6)
+
+
+class Curved(Linear):
+    """The linear model with a pulse that goes with the square of the speed."""
+
+    def __call__(
+        self, inputs: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]
+    ) -> Observation | None:
+        squared = inputs["impact_speed"] ** 2
+        return super().__call__({**inputs, "impact_speed": squared}, effects)
+
+
+def test_slopes_of_an_exact_fit_are_those_at_the_most_probable_speeds() -> None:
+    """One-sided differences over half a latent stop a fit of confounded values halfway."""
+    problem = replace(make_problem(3, speed_sd=1.0), simulate=Curved())
+    layouts = layouts_of(problem)
+    found = fit(problem, layouts, (), start_scores(layouts, 1), SCATTER)
+    for k, (layout, own) in enumerate(zip(layouts, found.scores.own, strict=True)):
+        speed = layout.test.inputs["impact_speed"] + float(own[0])
+        height = 10.0 * speed**2 + 3.0 * found.scores.shared[0]
+        time, values = found.observations[k].signals["head_acceleration"]
+        one, none = (
+            layout.whitened(Observation({"head_acceleration": (time, values * share)}, {}), own)
+            for share in (1.0 / height, 0.0)
+        )
+        pulse = one - none
+        slope = found.slopes.doubtful[k][:, 0] @ pulse / (pulse @ pulse)
+        assert slope == pytest.approx(20.0 * speed, rel=0.02)
 
 
 def test_another_repeatability_is_another_covariance(fitted: Fit) -> None:

@@ -22,6 +22,7 @@ BOTTOMING = Hidden("hood_bottoming", "soft_start",
 WARMING = Hidden("sensor_gain", "warming", {"change": 0.05})
 RINGING = Hidden("ringing", "", {"share": 0.08, "length": 0.012})
 CABLE = Hidden("cable", "", {"size": 2.0})
+SMOOTH = Hidden("hood_yield", "smooth", {"force": 2800.0, "remaining": 0.3})
 FALLING = Hidden("speed_bias", "falling", {"height": 0.4})
 CLIPPED = Hidden("sensor_saturation", "catalogue", {"limit": 100.0})
 
@@ -46,6 +47,7 @@ def find(folder: Path, hidden: list[Hidden], names: tuple[str, ...], seed: int =
         (BOTTOMING, ("hood_yield",), {"hood_bottoming"}),
         (WARMING, ("hood_force_scale", "speed_bias"), {"sensor_gain"}),
         (CLIPPED, ("hood_yield",), {"sensor_saturation"}),
+        (SMOOTH, ("hood_inertia",), {"hood_yield"}),
         (FALLING, ("sensor_gain", "hood_force_scale"), {"speed_bias"}),
     ],
     ids=lambda entry: entry.form if isinstance(entry, Hidden) else None,

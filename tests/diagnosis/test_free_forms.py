@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.special import logsumexp
 
+from mcstudy.diagnosis.base_model import fit_base
 from mcstudy.diagnosis.fit import Fit, fit
 from mcstudy.diagnosis.jacobian import expand_tests, observe_tests
 from mcstudy.diagnosis.layout import Layout
 from mcstudy.diagnosis.model_selection import DISTINCT
 from mcstudy.diagnosis.normal_equations import NormalEquations, Scores
 from mcstudy.diagnosis.problem import Cause, Form, Problem
-from mcstudy.diagnosis.search import fit_base
 from mcstudy.diagnosis.trends import add_trends
 from mcstudy.measurement.measured_data import load_measured
 from studies.diagnosis.causes import causes_of

@@ -8,13 +8,13 @@ from linear_tests import BUMP, make_problem
 from scipy import stats
 
 from mcstudy.diagnosis import gain
+from mcstudy.diagnosis.base_model import fit_base
 from mcstudy.diagnosis.discrepancy import fit_discrepancy
 from mcstudy.diagnosis.fit import Fit
 from mcstudy.diagnosis.gain import Gain, measure_gain
 from mcstudy.diagnosis.layout import Layout
 from mcstudy.diagnosis.model_selection import rank_causes, settle
 from mcstudy.diagnosis.problem import Problem
-from mcstudy.diagnosis.search import fit_base
 from mcstudy.diagnosis.templates import smooth_discrepancy
 from studies.diagnosis.words import gain_words
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mcstudy.diagnosis.search import fit_base
+from mcstudy.diagnosis.base_model import fit_base
 from mcstudy.measurement.measured_data import load_measured
 from models.registry import load_model
 from studies.diagnosis.causes import causes_of

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from linear_tests import Linear, make_problem
 
+from mcstudy.diagnosis.base_model import fit_base
 from mcstudy.diagnosis.problem import Observation, Problem, Scalar
 from mcstudy.diagnosis.roughness import measure_roughness, widen
-from mcstudy.diagnosis.search import fit_base
 
 JUMPS = 0.4
 

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
+from mcstudy.diagnosis.base_model import fit_base
 from mcstudy.diagnosis.fit import fit
 from mcstudy.diagnosis.layout import Scatter
 from mcstudy.diagnosis.normal_equations import Scores
-from mcstudy.diagnosis.search import fit_base
 from mcstudy.measurement.measured_data import load_measured
 from studies.diagnosis.causes import causes_of
 from studies.diagnosis.model_choice import choose_model

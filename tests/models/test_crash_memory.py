@@ -69,9 +69,8 @@ def test_many_models_keep_no_more_crashes_than_one() -> None:
     """A search holds a model for each effect; each of its own kept 128 MB of crashes."""
     models = [load_model("planar", {}, {"sensor_gain": {}, "sensor_offset": {}}) for _ in range(3)]
     gc.collect()
-    for k in range(2 * MOST // 3):
-        for model in models:
-            model.observe({"impact_speed": 9.0 + 0.01 * k}, SEEN, ())
+    for k in range(MOST + 4):
+        models[k % 3].observe({"impact_speed": 9.0 + 0.01 * k}, SEEN, ())
     held = [entry for entry in gc.get_objects() if isinstance(entry, Raw)]
     assert len(held) <= MOST + 1
 

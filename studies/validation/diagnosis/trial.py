@@ -13,13 +13,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from mcstudy.diagnosis.base_model import fit_base
 from mcstudy.diagnosis.fit import fit
 from mcstudy.diagnosis.gain import Quantities, measure_gain
 from mcstudy.diagnosis.layout import Scatter
 from mcstudy.diagnosis.model_selection import rescale
 from mcstudy.diagnosis.problem import Problem
 from mcstudy.diagnosis.screening import POWER
-from mcstudy.diagnosis.search import Finding, fit_base, names_of, search
+from mcstudy.diagnosis.search import Finding, names_of, search
 from mcstudy.measurement.measured_data import Measured, load_measured
 from studies.diagnosis.causes import causes_of
 from studies.diagnosis.model_choice import ModelChoice, choose_model

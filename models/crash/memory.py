@@ -29,12 +29,6 @@ class CrashMemory:
 
     def __init__(self, chain: EffectChain) -> None:
         self._chain = chain
-        self._recorded = {
-            effect.input_name(name)
-            for effect in chain.effects
-            if effect.stage == "signal"
-            for name in effect.parameters
-        }
 
     def recall(self, setup: Hashable, values: Mapping[str, float]) -> Raw | str | None:
         """Return the crash of these inputs with their record, or None if it is not kept.
@@ -73,5 +67,5 @@ class CrashMemory:
             _KEPT.popitem(last=False)
 
     def _key(self, setup: Hashable, values: Mapping[str, float]) -> _Key:
-        acting = (item for item in values.items() if item[0] not in self._recorded)
+        acting = (item for item in values.items() if item[0] not in self._chain.recorded)
         return setup, tuple(acting)

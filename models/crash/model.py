@@ -94,9 +94,9 @@ class CrashModel(ABC):
                     f"{option} must lie within 0 and {outcome.HIGHEST_CLASS:g}, given {value}"
                 )
         self.vehicle: Vehicle = load_vehicle(vehicle)
-        self._car = (vehicle, hood_curve and tuple(tuple(knot) for knot in hood_curve))
         if hood_curve is not None:
             self.vehicle = self.vehicle.with_curve(HOOD, hood_curve)
+        self._car = (vehicle, hood_curve and tuple(tuple(knot) for knot in hood_curve))
         self.tick = float(tick)
         self._chain = build_chain(self.name, effects)
         self._memory = CrashMemory(self._chain)

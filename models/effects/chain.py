@@ -46,6 +46,16 @@ class EffectChain:
         return subject
 
     @functools.cached_property
+    def recorded(self) -> frozenset[str]:
+        """Inputs that change how a run is recorded, not the run: parameters of signal effects."""
+        return frozenset(
+            effect.input_name(name)
+            for effect in self.effects
+            if effect.stage == "signal"
+            for name in effect.parameters
+        )
+
+    @functools.cached_property
     def _stages(self) -> dict[str, list[tuple[Effect, list[tuple[str, str, float]]]]]:
         """Effects by stage, each with its parameters, their names as inputs and usual values."""
         stages: dict[str, list[tuple[Effect, list[tuple[str, str, float]]]]] = {}

@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -54,6 +55,8 @@ LEFT = 0.005
 """s without contact after which a headform has left a part of the hood that moves on its own."""
 
 
+MOST = 64
+"""Impacts kept, some 10 kB each: those that differ only in how they are recorded share one."""
 MOTION = frozenset({"impact_speed", "impact_angle"})
 """Inputs that do not change what is struck."""
 
@@ -100,6 +103,7 @@ class ZoneTarget:
         zone: str,
     ) -> None:
         self._skin = skin
+        self._kept: OrderedDict[tuple[float, ...], Strike] = OrderedDict()
         self._last: tuple[tuple[float, ...], _Hood] | None = None
         self._curve: ForceCurve | None = None
         self._corridor: Corridor | None = None
@@ -159,7 +163,20 @@ class ZoneTarget:
         impactor : Impactor
             The headform.
         """
-        hood = self._hood(values, chain, impactor.mass)
+        acting = {name: value for name, value in values.items() if name not in chain.recorded}
+        key = tuple(acting.values())
+        kept = self._kept.get(key)
+        if kept is not None:
+            self._kept.move_to_end(key)
+            return kept
+        found = self._step(acting, self._hood(acting, chain, impactor.mass), impactor)
+        self._kept[key] = found
+        if len(self._kept) > MOST:
+            self._kept.popitem(last=False)
+        return found
+
+    def _step(self, values: Mapping[str, float], hood: _Hood, impactor: Impactor) -> Strike:
+        """Return the impact on a hood."""
         stride = hood.stride
         speed, angle = values["impact_speed"], values["impact_angle"]
         speeds = (speed * math.cos(angle), speed * math.sin(angle))

@@ -105,7 +105,10 @@ class Simulation:
         self, inputs: Mapping[str, float], effects: Mapping[str, Mapping[str, float]]
     ) -> Observation | None:
         """Return a simulated test, or None if the run fails."""
-        model = self.model(effects)
+        nonlinear = ACCELERATION in self._filters and any(
+            load_effect(name).nonlinear for name in {*self._effects, *effects}
+        )
+        model = self.model({*effects, "sensor_gain"} if nonlinear else effects)
         values = dict(inputs)
         for cause, parameters in effects.items():
             values |= {f"{cause}_{name}": value for name, value in parameters.items()}
@@ -116,14 +119,12 @@ class Simulation:
             return None
         scalars = {name: run.outputs[name] for name in self._scalars}
         signals = self._signals(model, run)
-        nonlinear = any(load_effect(name).nonlinear for name in {*self._effects, *effects})
-        if not (nonlinear and ACCELERATION in signals):
+        if not nonlinear:
             return Observation(signals, scalars)
         # A gain acts on what the sensor feels.
-        amplified = self.model({*effects, "sensor_gain"})
-        usual = next(i.nominal for i in amplified.inputs if i.name == GAIN)
+        usual = next(i.nominal for i in model.inputs if i.name == GAIN)
         values[GAIN] = (1.0 + STEP) * values.get(GAIN, usual)
-        more = self._signals(amplified, amplified.observe(values, seen, ()))
+        more = self._signals(model, model.observe(values, seen, ()))
         response = (more[ACCELERATION][1] - signals[ACCELERATION][1]) / STEP
         return Observation(signals, scalars, responses={ACCELERATION: response})
 

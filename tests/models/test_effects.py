@@ -299,3 +299,24 @@ def test_a_braced_body_does_not_swing_its_limbs() -> None:
         braced.orientation[SEGMENTS.index(f"upper_arm_{side}")] for side in ("left", "right")
     )
     np.testing.assert_allclose(left, right, atol=1e-12)
+
+
+def test_a_headform_impact_is_kept_for_other_records_of_it_and_for_nothing_else() -> None:
+    effects: Effects = {"sensor_gain": {}, "sensor_saturation": {}, "hood_inertia": {}}
+    one = load_model("headform", {}, effects)
+    for change in (
+        {},
+        {"sensor_gain_factor": 1.2},
+        {"sensor_saturation_limit": 60.0},
+        {"hood_inertia_mass": 0.5},
+        {"impact_speed": 9.0},
+        {"impact_speed": 9.0, "headform_mass": 3.5},
+        {"hood_stiffness": 0.9},
+        {},
+    ):
+        alone = load_model("headform", {}, effects).run(change)
+        again = one.run(change)
+        assert again.outputs == alone.outputs
+        for group, history in again.histories.items():
+            for name, values in history.channels.items():
+                np.testing.assert_array_equal(values, alone.histories[group].channels[name])

@@ -10,6 +10,11 @@ from matplotlib.figure import Figure
 
 from mcstudy.figures.style import png_bytes
 
+LONGEST = 32
+"""Characters of a cell that is set as a number."""
+BEGINNINGS = tuple("–-0123456789")
+"""First characters of one."""
+
 
 @dataclass(frozen=True)
 class Table:
@@ -18,6 +23,16 @@ class Table:
     caption: str
     head: Sequence[str]
     rows: Sequence[Sequence[str]]
+
+    @property
+    def numbers(self) -> frozenset[int]:
+        """Columns, the first one aside, that hold nothing but numbers."""
+        columns = [
+            [row[k] for row in self.rows if k < len(row) and row[k]] for k in range(len(self.head))
+        ]
+        return frozenset(
+            k for k, cells in enumerate(columns) if k and cells and all(map(is_number, cells))
+        )
 
 
 @dataclass(frozen=True)
@@ -35,6 +50,11 @@ class Section:
     pages: Mapping[str, str] = field(default_factory=dict)
 
 
+def is_number(cell: str) -> bool:
+    """Return whether a cell is set as a number: a short one that begins like one."""
+    return len(cell) <= LONGEST and cell[:1] in BEGINNINGS
+
+
 def render(title: str, subtitle: str, sections: Sequence[Section]) -> str:
     """Return the HTML of a report; all text is escaped.
 
@@ -46,6 +66,7 @@ def render(title: str, subtitle: str, sections: Sequence[Section]) -> str:
     """
     source = files("mcstudy.report").joinpath("template.html").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.globals["is_number"] = is_number
     shown = [
         {
             "heading": section.heading,

@@ -81,3 +81,13 @@ def test_report_holds_tables_figures_and_animations() -> None:
     assert sources[1].startswith("data:image/gif;")
     assert set(document.values("href")) == {f"#{mark}" for mark in document.values("id")}
     assert render("Title", "", []).startswith("<!DOCTYPE html>")
+
+
+def test_heads_of_columns_of_numbers_stand_above_them() -> None:
+    rows = [["wad", "1.32", "", "2 of 3"], ["hic15", "–", "few", "1 of 3"]]
+    table = Table("Outputs", ["output", "mean", "target", "met"], rows)
+    document = Document(render("Title", "Subtitle", [Section("Result", [], [table])]))
+    styled = [(tag, value) for tag, name, value in document.attributes if name == "class"]
+    heads = [value for tag, value in styled if tag == "th"]
+    assert heads == ["number", "number"]
+    assert styled.count(("td", "number")) == 4

@@ -178,8 +178,9 @@ def validate(
 ) -> None:
     """Run the models against closed forms, published numbers and measurements.
 
-    With --diagnosis: hide effects in data, diagnose them, and print the detection rates; with
-    --full-scale N the same for N sets a cause of full-scale tests and accidents (minutes a set).
+    With --diagnosis: hide effects in data, diagnose them, and print the detection rates (hours; an
+    interrupted validation goes on with the same command); with --full-scale N the same for N sets a
+    cause of full-scale tests and accidents (minutes a set).
     """
     from mcstudy.execution.results import ResultsFolder
     from studies.validation import report

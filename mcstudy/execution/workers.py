@@ -62,3 +62,21 @@ def run_jobs(
     with parallel_backend(workers):
         found: list[Result] = joblib.Parallel()(joblib.delayed(function)(item) for item in items)
     return found
+
+
+def stream_jobs(
+    function: Callable[[Item], Result], items: Iterable[Item], workers: int
+) -> Iterator[Result]:
+    """Yield the results of a function for each item as they come, computed in parallel.
+
+    Parameters
+    ----------
+    function : callable
+        Top-level function of one item.
+    items : iterable
+    workers : int
+        Processes, -1 for one a core.
+    """
+    with parallel_backend(workers):
+        pool = joblib.Parallel(return_as="generator_unordered")
+        yield from pool(joblib.delayed(function)(item) for item in items)

@@ -15,11 +15,12 @@ from studies.diagnosis.causes import causes_of
 from studies.diagnosis.model_choice import choose_model
 from studies.diagnosis.problem import build_problem
 from studies.diagnosis.study import simulation_of
+from studies.validation.diagnosis import outcomes
 from studies.validation.diagnosis.drawing import CATALOGUE, KINDS, OUTSIDE, draw
 from studies.validation.diagnosis.hidden_effects import make_tests
 from studies.validation.diagnosis.laboratory import CURVE, Hidden, Laboratory
 from studies.validation.diagnosis.tier import TARGETS, analyse, plan
-from studies.validation.diagnosis.trial import Outcome, Trial, run_trial
+from studies.validation.diagnosis.trial import HeldOut, Outcome, Trial, run_trial
 
 QUIET = Laboratory(tests=3, noise_sd=0.0, scatter=0.0, speed_sd=0.0, scale_sd=0.0)
 
@@ -215,6 +216,35 @@ def test_rates_count_what_they_say() -> None:
     assert (pairs["kind"], pairs["named"]["value"]) == ("pair", 1.0)
     assert found["confusion"]["sensor_gain"] == {"sensor_gain": 1, "speed_bias": 1}
     assert found["confusion"]["nothing"] == {"adequate": 1, "sensor_gain": 1}
+
+
+def test_an_interrupted_validation_goes_on_where_it_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried: list[Trial] = []
+
+    def run(trial: Trial) -> Outcome:
+        tried.append(trial)
+        if len(tried) == 3:
+            raise KeyboardInterrupt
+        gains = {"inside": HeldOut(0.4, float("nan"), 0.9, 0.9)}
+        return outcome_of(trial.kind, ("sensor_gain",), "sensor_gain", trial=trial, gains=gains)
+
+    monkeypatch.setattr(outcomes, "run_trial", run)
+    trials = [Trial(k, "own form", force=False) for k in range(4)]
+    with pytest.raises(KeyboardInterrupt):
+        outcomes.run_trials(tmp_path, trials, 1, quiet=True)
+    (file,) = tmp_path.iterdir()
+    # The machine went down in the middle of a line.
+    file.write_text(file.read_text() + '\n{"trial": {"se')
+    tried.append(trials[0])
+    found = outcomes.run_trials(tmp_path, trials, 1, quiet=True)
+    assert tried[4:] == trials[2:]
+    assert [outcome.trial for outcome in found] == trials
+    assert found[0].gains["inside"].crps == 0.4
+    assert np.isnan(found[0].gains["inside"].against_process)
+    assert len(list(outcomes.run_trials(tmp_path, trials, 1, quiet=True))) == 4
+    assert len(tried) == 6
 
 
 def test_a_plan_has_every_kind_and_about_the_number_asked_for() -> None:

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mcstudy.execution.progress import follow
 from mcstudy.execution.results import ResultsFolder
-from mcstudy.execution.workers import run_jobs
 from mcstudy.figures import style
 from mcstudy.figures.panels import Curve, Panel, draw_panels
 from mcstudy.report import Section, Table
@@ -18,7 +16,8 @@ from mcstudy.statistics import Estimate, probability
 from mcstudy.text import number, percent
 from mcstudy.typed_json import from_plain
 from studies.publishing import publish
-from studies.validation.diagnosis.trial import Outcome, Trial, run_trial
+from studies.validation.diagnosis.outcomes import run_trials
+from studies.validation.diagnosis.trial import Outcome, Trial
 
 SHARES = {
     ("none", False, True): 3,
@@ -39,8 +38,6 @@ half of the sets have forms or effects that the catalogue does not have."""
 SETS = 300
 SEED = 32_000
 """Seed of the first trial of a kind."""
-BATCH = 16
-"""Trials that are run at a time."""
 VISIBLE, LARGE = 1.0, 10.0
 """Sizes over the minimum detectable one from which an effect counts as visible and as large."""
 BINS = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, np.inf)
@@ -121,6 +118,8 @@ def validate_diagnosis(
 ) -> dict[str, Any]:
     """Run the trials, write their report and return the analysis.
 
+    Trials that an interrupted validation of the same code left in the folder are not run again.
+
     Parameters
     ----------
     folder : ResultsFolder
@@ -135,10 +134,8 @@ def validate_diagnosis(
     trials = plan(sets)
     # Sorted by seed, so that every kind is there from the start.
     trials.sort(key=lambda t: (t.seed, t.kind, t.force))
-    outcomes: list[Outcome] = []
-    for start in follow(range(0, len(trials), BATCH), f"batches of {BATCH} trials", quiet=quiet):
-        outcomes += run_jobs(run_trial, trials[start : start + BATCH], workers)
     with folder.open_for_writing():
+        outcomes = run_trials(folder.path, trials, workers, quiet=quiet)
         return publish(
             folder, "Validation of the diagnosis",
             f"{len(outcomes)} sets of tests from seed {SEED} on, effects hidden by an independent "

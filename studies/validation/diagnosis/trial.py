@@ -22,6 +22,7 @@ from mcstudy.diagnosis.problem import Problem
 from mcstudy.diagnosis.screening import POWER
 from mcstudy.diagnosis.search import Finding, names_of, search
 from mcstudy.measurement.measured_data import Measured, load_measured
+from mcstudy.typed_json import Real
 from studies.diagnosis.causes import causes_of
 from studies.diagnosis.model_choice import ModelChoice, choose_model
 from studies.diagnosis.problem import build_problem
@@ -69,10 +70,10 @@ class HeldOut:
         Share of the tests within 90 % intervals, of the base and the extended model.
     """
 
-    crps: float
-    against_process: float
-    coverage_base: float
-    coverage: float
+    crps: Real
+    against_process: Real
+    coverage_base: Real
+    coverage: Real
 
 
 @dataclass(frozen=True)
@@ -114,19 +115,19 @@ class Outcome:
     trial: Trial
     hidden: tuple[str, ...]
     names: tuple[str, ...]
-    size: float
-    p_value: float
+    size: Real
+    p_value: Real
     cause: str | None
     ambiguous: tuple[str, ...]
     second: str | None
     second_ambiguous: tuple[str, ...]
     flagged: bool
     why: str
-    seconds: float
-    evidence: Mapping[str, float] = field(default_factory=dict)
-    share: float = 1.0
-    left: float = 0.0
-    flip_p_value: float = 1.0
+    seconds: Real
+    evidence: Mapping[str, Real] = field(default_factory=dict)
+    share: Real = 1.0
+    left: Real = 0.0
+    flip_p_value: Real = 1.0
     gains: Mapping[str, HeldOut] = field(default_factory=dict)
 
     @property

@@ -1,0 +1,71 @@
+"""Outcomes of trials, kept as they come: an interrupted validation goes on where it stopped."""
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import mcstudy
+import models
+import studies
+from mcstudy.execution.progress import follow, say
+from mcstudy.execution.workers import stream_jobs
+from mcstudy.typed_json import from_plain, to_plain
+from studies.validation.diagnosis.trial import Outcome, Trial, run_trial
+
+PACKAGES = (mcstudy, models, studies)
+CODE = (".py", ".toml")
+"""Endings of the files on which an outcome depends."""
+
+
+def run_trials(
+    folder: Path, trials: Sequence[Trial], workers: int, *, quiet: bool
+) -> list[Outcome]:
+    """Return the outcomes of trials, in order; those in the folder are not run again.
+
+    Outcomes of other code are not counted: the file is named after a digest of the code.
+
+    Parameters
+    ----------
+    folder : path
+        Where outcomes are kept, one line each.
+    trials : sequence of Trial
+    workers : int
+        Processes, -1 for one a core.
+    quiet : bool
+        No progress line.
+    """
+    file = folder / f"outcomes-{_digest()}.jsonl"
+    held = {outcome.trial: outcome for outcome in _read(file)}
+    left = [trial for trial in trials if trial not in held]
+    if held:
+        say(f"{len(trials) - len(left)} of {len(trials)} trials were run before", quiet=quiet)
+    found = stream_jobs(run_trial, left, workers)
+    for _ in follow(range(len(left)), "trials", quiet=quiet):
+        outcome = next(found)
+        with file.open("a", encoding="utf-8") as lines:
+            # On a line of its own, even after one that was cut off.
+            lines.write("\n" + json.dumps(to_plain(outcome)))
+        held[outcome.trial] = outcome
+    return [held[trial] for trial in trials]
+
+
+def _read(file: Path) -> Iterator[Outcome]:
+    """Yield the outcomes of a file; empty lines and one that was cut off are left out."""
+    if not file.exists():
+        return
+    for line in file.read_text(encoding="utf-8").splitlines():
+        try:
+            yield from_plain(Outcome, json.loads(line))
+        except json.JSONDecodeError:
+            continue
+
+
+def _digest() -> str:
+    """Return a digest of the code and data of the packages."""
+    digest = hashlib.sha256()
+    for package in PACKAGES:
+        base = Path(package.__path__[0])
+        for file in sorted(path for path in base.rglob("*") if path.suffix in CODE):
+            digest.update(file.relative_to(base).as_posix().encode() + file.read_bytes())
+    return digest.hexdigest()[:12]

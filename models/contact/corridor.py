@@ -84,6 +84,10 @@ class Corridor:
         return half(self.lower), half(self.upper)
 
 
+MOST_GIVEN = 16
+"""Largest number of knots of a curve that is read; effects add others to it."""
+
+
 def read_curve(knots: Any, unloading_ratio: float, damping: float = 0.0) -> ForceCurve:
     """Return a loading curve from its knots.
 
@@ -104,6 +108,8 @@ def read_curve(knots: Any, unloading_ratio: float, damping: float = 0.0) -> Forc
     table = np.array(knots, dtype=np.float64)
     if table.ndim != 2 or table.shape[1] != 2:
         raise ValueError("must be a list of pairs [penetration m, force N]")
+    if len(table) > MOST_GIVEN:
+        raise ValueError(f"a loading curve takes 2 to {MOST_GIVEN} knots, given {len(table)}")
     return ForceCurve(table[:, 0].copy(), table[:, 1].copy(), unloading_ratio, damping)
 
 

@@ -20,7 +20,7 @@ from models.compilation import inlined_kernel, kernel
 
 Array = NDArray[np.float64]
 
-KNOTS = 32
+KNOTS = 64
 """Largest number of knots of a combined law; each side has at most half of them."""
 
 DAMPING_ONSET = 0.005

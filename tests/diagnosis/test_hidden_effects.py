@@ -45,6 +45,8 @@ def test_generator_and_model_agree_where_nothing_is_hidden(tmp_path: Path) -> No
         ("rate_dependent_hood", "dashpot", {"damping": 60.0}, {"damping": 60.0, "share": 0.0}),
         ("hood_bottoming", "catalogue", {"clearance": 0.03, "stiffness": 2e5},
          {"clearance": 0.03, "stiffness": 2e5, "power": 1.0}),
+        ("hood_bottoming", "quadratic", {"clearance": 0.028, "stiffness": 4e5},
+         {"clearance": 0.028, "stiffness": 4e5, "power": 2.0}),
         ("hood_yield", "catalogue", {"force": 2800.0, "remaining": 0.2},
          {"force": 2800.0, "remaining": 0.2}),
         ("hood_inertia", "catalogue", {"mass": 0.4, "depth": 0.01}, {"mass": 0.4, "depth": 0.01}),

@@ -320,3 +320,18 @@ def test_a_headform_impact_is_kept_for_other_records_of_it_and_for_nothing_else(
         for group, history in again.histories.items():
             for name, values in history.channels.items():
                 np.testing.assert_array_equal(values, alone.histories[group].channels[name])
+
+
+@pytest.mark.parametrize(("name", "knots"), [("headform", 16), ("multibody", 8)])
+def test_effects_have_room_for_their_knots_beside_the_longest_curve(name: str, knots: int) -> None:
+    """A curve of 16 knots used to end a run with effects in an error."""
+    depths = np.linspace(0.0, 0.09, knots)
+    forces = 5500.0 * (1.0 - np.exp(-depths / 0.03))
+    curve = [list(pair) for pair in zip(depths.tolist(), forces.tolist(), strict=True)]
+    effects = {
+        "hood_yield": {"force": 4000.0, "kept_to_10_percent": 0.6, "kept_to_25_percent": 0.3},
+        "hood_bottoming": {"clearance": 0.03, "power": 2.0},
+    }
+    run = load_model(name, {"hood_curve": curve}, effects).run({})
+    assert run.status == "ok"
+    assert run.outputs["hic15"] != load_model(name, {"hood_curve": curve}).run({}).outputs["hic15"]

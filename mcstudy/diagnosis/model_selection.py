@@ -43,6 +43,9 @@ _Found = TypeVar("_Found", Survey, Fit)
 
 DISTINCT = 3.0
 """Log evidence within which causes are indistinguishable, and below which none is named."""
+WIDENING = 2.0
+"""Log units of evidence for each of misfit that remains within which causes are indistinguishable
+(calibrated on hidden sets of foreign forms)."""
 STRUCTURE = 0.01
 """p-value below which the residuals of a fit have structure."""
 MAX_SHARE = 0.9
@@ -70,13 +73,18 @@ MIN_COUNT, MIN_DEAR = 6, 2
 
 @dataclass(frozen=True)
 class Candidate:
-    """A cause with its best fit and log Bayes factor over the base model, averaged over forms."""
+    """A cause with its best fit and log Bayes factor over the base model, averaged over forms.
+
+    ``forms`` holds the log Bayes factor of each form by name, ``others`` the fits of its formulas
+    other than the best one.
+    """
 
     cause: Cause
     fitted: Fit
     form: Form
     log_evidence: float
     forms: dict[str, float]
+    others: tuple[Fit, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -285,6 +293,7 @@ def rank_causes(
                 # Pruned forms count in the average: their evidence is negligible.
                 float(special.logsumexp(evidence) - np.log(len(cause.forms))),
                 {entry.name: float(v) for (entry, _), v in zip(own_fits, evidence, strict=True)},
+                tuple(f for entry, f in own_fits if entry.named and entry.name != form.name),
             )
         )
     return sorted(candidates, key=lambda candidate: -candidate.log_evidence)
@@ -303,6 +312,25 @@ def _gaining(found: Sequence[_Found], without: float) -> list[_Found]:
     best = min((entry.misfit for entry in found), default=0.0)
     behind = max(CLOSE, (1.0 - LITTLE) * (without - best))
     return [entry for entry in found if entry.misfit <= best + behind]
+
+
+def indistinguishable(candidates: Sequence[Candidate], left: float = 0.0) -> tuple[str, ...]:
+    """Return the causes indistinguishable from the best one, with it; none if it is unique.
+
+    Where the best one leaves structure, so may the difference of two causes be due to their forms:
+    what a free discrepancy would still explain counts as the uncertainty of the evidence.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+        By evidence, best first.
+    left : float
+        Log units that a free discrepancy would still explain beside the best one.
+    """
+    apart = max(DISTINCT, WIDENING * left)
+    limit = candidates[0].log_evidence - apart
+    near = tuple(c.cause.name for c in candidates if c.log_evidence > limit)
+    return near if len(near) > 1 else ()
 
 
 def examine(problem: Problem, layouts: Sequence[Layout], extended: Fit, gained: float) -> Remainder:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mcstudy.diagnosis.base_model import fit_base
+from mcstudy.diagnosis.cause_pairs import best_pair
 from mcstudy.diagnosis.fit import Fit
 from mcstudy.diagnosis.jacobian import shared_names
 from mcstudy.diagnosis.layout import Layout
@@ -13,9 +14,11 @@ from mcstudy.diagnosis.model_selection import (
     DISTINCT,
     MAX_SHARE,
     STRUCTURE,
+    WIDENING,
     Candidate,
     Remainder,
     examine,
+    indistinguishable,
     rank_causes,
 )
 from mcstudy.diagnosis.problem import Cause, Problem
@@ -36,36 +39,15 @@ from mcstudy.diagnosis.templates import (
 )
 from mcstudy.diagnosis.trends import add_trends
 
-WIDENING = 2.0
-"""Log units of evidence for each of misfit that remains within which causes are indistinguishable
-(calibrated on hidden sets of foreign forms)."""
 DOUBTFUL = 0.1
 """p-value of the remaining structure below which it counts in the naming."""
-SECOND = 6.0
-"""Log evidence that a second cause must add."""
-SINGLES, SECONDS = 30, 12
-"""Forms that are refitted, as a single cause and as a second one."""
-FAINT_SHARE = 0.003
-"""Share of the first cause's log evidence that a second one must add where the residuals of the
-first pass the general test: even the best form of a large effect leaves a small residual."""
-ENOUGH = 0.8
-"""Share of what a free discrepancy would explain beside the first cause that a second one must add
-where they do not."""
+SINGLES = 30
+"""Forms that are refitted as a single cause."""
 HOPELESS = 0.3
 """Share of the misfit that the first cause must explain for a second one to be sought."""
-NOTABLE = 0.1
-"""The same where the residuals of both causes have structure."""
-NEARLY_ALL = 0.99
-"""Share of the misfit that two causes must explain where structure remains."""
 FURTHER, STILL = 3.5, 6.0
 """Template score, in standard errors, and misfit that a discrepancy would still explain, in log
 units, that indicate a second cause after a first one whose residuals pass the general test."""
-MAX_SECONDS = 2
-"""Largest number of indistinguishable second causes; with more of them none is named."""
-RIVAL = 0.5
-"""Share of the best log evidence above which another cause is tried as the first of two."""
-PAIRS = 2
-"""Causes, best first, with which a second one is tried."""
 
 UNEXPLAINED = "unexplained"
 
@@ -219,7 +201,7 @@ def _judge(
         nothing,
         remainder=left,
         cause=best.cause.name,
-        ambiguous=_near(candidates, doubt),
+        ambiguous=indistinguishable(candidates, doubt),
         best=best.fitted,
         why="one cause explains the misfit",
     )
@@ -236,7 +218,7 @@ def _judge(
     found, share = None, left.share
     if left.share >= HOPELESS:
         tell(f"looking for a second cause beside {best.cause.name}")
-        found, beyond = _best_pair(problem, causes, empty, candidates, left, workers, bank)
+        found, beyond = best_pair(problem, causes, empty.layouts, candidates, left, workers, bank)
         # The repeatability takes part of what is left; a second cause may show that it did.
         share = min(share, best.log_evidence / (best.log_evidence + max(beyond, 0.0)))
     if found is not None:
@@ -248,7 +230,7 @@ def _judge(
             ambiguous=firsts,
             remainder=rest,
             second=pair.seconds[0],
-            second_ambiguous=_near(pair.seconds),
+            second_ambiguous=indistinguishable(pair.seconds),
             best=pair.seconds[0].fitted,
             flagged=not explained,
             why="two causes explain the misfit together"
@@ -286,91 +268,3 @@ def _trace(fitted: Fit, layouts: Sequence[Layout], bank: Sequence[Template]) -> 
     score, information = score_templates(fitted, layouts, bank)
     seen = information > 0.0
     return bool(np.any(np.abs(score[seen]) > FURTHER * np.sqrt(information[seen])))
-
-
-def _near(candidates: Sequence[Candidate], left: float = 0.0) -> tuple[str, ...]:
-    """Return the causes indistinguishable from the best one, with it; none if it is unique.
-
-    Where the best one leaves structure, so may the difference of two causes be due to their forms:
-    what a free discrepancy would still explain counts as the uncertainty of the evidence.
-    """
-    apart = max(DISTINCT, WIDENING * left)
-    limit = candidates[0].log_evidence - apart
-    near = tuple(c.cause.name for c in candidates if c.log_evidence > limit)
-    return near if len(near) > 1 else ()
-
-
-def _needed(sole: float, alone: Remainder) -> float:
-    """Return the log evidence that a second cause must add beside a first one of evidence sole."""
-    small = FAINT_SHARE * sole if alone.p_value >= STRUCTURE else ENOUGH * alone.left
-    return max(SECOND, small)
-
-
-@dataclass(frozen=True)
-class _Pair:
-    """Two causes together: the first, and the second ones by evidence."""
-
-    first: Candidate
-    seconds: list[Candidate]
-
-    @property
-    def log_evidence(self) -> float:
-        """Log evidence of both together, averaged over the forms of each."""
-        return self.first.log_evidence + self.seconds[0].log_evidence
-
-    @property
-    def second(self) -> str:
-        """Name of the second cause."""
-        return self.seconds[0].cause.name
-
-
-def _best_pair(
-    problem: Problem,
-    causes: Sequence[Cause],
-    empty: Finding,
-    candidates: Sequence[Candidate],
-    alone: Remainder,
-    workers: int,
-    bank: Sequence[Template] | None,
-) -> tuple[tuple[_Pair, Remainder, tuple[str, ...]] | None, float]:
-    """Return the pair of causes that explains the misfit, None if no second cause is warranted.
-
-    With its remaining structure, and first causes that do equally well with the same second one;
-    and the log evidence of the best pair beyond that of the first cause, warranted or not.
-
-    Parameters
-    ----------
-    alone : Remainder
-        Remaining structure of the first cause alone.
-    bank : sequence of Template or None
-        Templates about it, where they are known.
-    """
-    pairs: list[_Pair] = []
-    for first in candidates[:PAIRS]:
-        if first.log_evidence < RIVAL * candidates[0].log_evidence:
-            continue
-        seconds = rank_causes(
-            problem, empty.layouts, first.fitted, causes, workers, SECONDS,
-            bank if first is candidates[0] else None,
-            min(_needed(first.log_evidence, alone), NOTABLE * first.log_evidence),
-        )  # fmt: skip
-        if seconds:
-            pairs.append(_Pair(first, seconds))
-    if not pairs:
-        return None, 0.0
-    best = max(pairs, key=lambda pair: pair.log_evidence)
-    added, sole = best.seconds[0].log_evidence, best.first.log_evidence
-    beyond = best.log_evidence - candidates[0].log_evidence
-    if len(_near(best.seconds)) > MAX_SECONDS:
-        return None, beyond
-    left = examine(problem, empty.layouts, best.seconds[0].fitted, sole + added)
-    if left.p_value >= STRUCTURE:
-        enough = added >= _needed(sole, alone)
-    else:
-        enough = left.share >= NEARLY_ALL and added >= NOTABLE * sole
-    if not enough:
-        return None, beyond
-    limit = best.log_evidence - DISTINCT
-    alike = [p for p in pairs if p.second == best.second and p.log_evidence > limit]
-    firsts = tuple(p.first.cause.name for p in alike) if len(alike) > 1 else ()
-    return (best, left, firsts), beyond

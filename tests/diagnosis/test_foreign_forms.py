@@ -66,10 +66,22 @@ def test_what_no_cause_explains_is_not_named(hidden: Hidden, tmp_path: Path) -> 
     assert found.cause == "unexplained"
 
 
-def test_an_effect_of_all_tests_beside_a_larger_one_is_the_second_cause(tmp_path: Path) -> None:
-    large = Hidden("hood_bottoming", "catalogue", {"clearance": 0.03, "stiffness": 2e5})
-    small = Hidden("sensor_gain", "catalogue", {"factor": 1.08})
-    found = find(tmp_path / "tests", [large, small], ("hood_bottoming", "sensor_gain"))
-    assert found.cause == "hood_bottoming"
+BOTTOM = Hidden("hood_bottoming", "catalogue", {"clearance": 0.03, "stiffness": 2e5})
+
+
+@pytest.mark.parametrize(
+    ("large", "small"),
+    [
+        (BOTTOM, Hidden("sensor_gain", "catalogue", {"factor": 1.08})),
+        # Alone, a gradual saturation imitates the gain.
+        (CLIPPED, Hidden("sensor_gain", "catalogue", {"factor": 0.9})),
+    ],
+    ids=lambda entry: entry.name,
+)
+def test_an_effect_of_all_tests_beside_a_larger_one_is_the_second_cause(
+    large: Hidden, small: Hidden, tmp_path: Path
+) -> None:
+    found = find(tmp_path / "tests", [small, large], (large.name, small.name))
+    assert found.cause == large.name
     assert found.second is not None
-    assert found.second.cause.name == "sensor_gain"
+    assert found.second.cause.name == small.name

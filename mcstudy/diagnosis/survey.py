@@ -157,7 +157,10 @@ def survey(
         without = solve(centre, centre.residuals, weight)[1]
         lowest = min(lowest, without)
         tried: dict[float, _Trial] = {}
-        for scores in score_grid(form, fine=weight < FAR):
+        # A threshold between two coarse levels may be without effect at the one and hide the data
+        # at the other.
+        fine = weight < FAR or (form.size == 1 and not problem.dear)
+        for scores in score_grid(form, fine=fine):
             start = Scores(np.concatenate([centre.scores.shared, scores]), centre.scores.own)
             seen = observe_tests(part, (*forms, form), places, start)
             if seen is None:

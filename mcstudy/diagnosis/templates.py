@@ -88,7 +88,8 @@ def score_grid(form: Form, *, fine: bool = False) -> list[Array]:
     if count == 0:
         return [np.zeros(0)]
     if count == 1:
-        return [np.array([z]) for z in (FINE if fine else ONE_PARAMETER)]
+        levels = sorted({*FINE, *ONE_PARAMETER}) if fine else ONE_PARAMETER
+        return [np.array([z]) for z in levels]
     first: Sequence[float] = FINE if fine else MORE_PARAMETERS
     others: Sequence[float] = BESIDE_FINE if fine else MORE_PARAMETERS
     axes = [first] + [others] * (min(count, STANDARD_GRID) - 1)

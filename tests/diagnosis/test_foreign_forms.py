@@ -27,8 +27,10 @@ FALLING = Hidden("speed_bias", "falling", {"height": 0.4})
 CLIPPED = Hidden("sensor_saturation", "catalogue", {"limit": 100.0})
 
 
-def find(folder: Path, hidden: list[Hidden], names: tuple[str, ...], seed: int = 7) -> Finding:
-    make_tests(folder, hidden, seed, Laboratory(tests=9))
+def find(
+    folder: Path, hidden: list[Hidden], names: tuple[str, ...], *, force: bool = False
+) -> Finding:
+    make_tests(folder, hidden, 7, Laboratory(tests=9, force=force, rebound=force))
     data = load_measured(folder)
     choice = choose_model(data, None)
     problem = build_problem(data, choice, simulation_of(data, choice))
@@ -73,15 +75,30 @@ BOTTOM = Hidden("hood_bottoming", "catalogue", {"clearance": 0.03, "stiffness": 
     ("large", "small"),
     [
         (BOTTOM, Hidden("sensor_gain", "catalogue", {"factor": 1.08})),
-        # Alone, a gradual saturation imitates the gain.
-        (CLIPPED, Hidden("sensor_gain", "catalogue", {"factor": 0.9})),
+        # A gain below one that takes most of the clipping on.
+        (
+            Hidden("sensor_gain", "catalogue", {"factor": 0.85}),
+            Hidden("sensor_saturation", "catalogue", {"limit": 110.0}),
+        ),
     ],
     ids=lambda entry: entry.name,
 )
-def test_an_effect_of_all_tests_beside_a_larger_one_is_the_second_cause(
+def test_an_effect_beside_a_larger_one_is_the_second_cause(
     large: Hidden, small: Hidden, tmp_path: Path
 ) -> None:
-    found = find(tmp_path / "tests", [small, large], (large.name, small.name))
+    found = find(tmp_path / "tests", [large, small], (large.name, small.name))
     assert found.cause == large.name
     assert found.second is not None
     assert found.second.cause.name == small.name
+
+
+def test_a_second_cause_is_sought_beside_other_forms_of_the_first(tmp_path: Path) -> None:
+    """Alone, a gradual saturation imitates the gain, beside which a gain explains nothing."""
+    gain = Hidden("sensor_gain", "catalogue", {"factor": 0.88})
+    clipped = Hidden("sensor_saturation", "catalogue", {"limit": 97.0})
+    names = ("sensor_gain", "sensor_saturation")
+    found = find(tmp_path / "tests", [gain, clipped], names, force=True)
+    assert found.candidates[0].form.name == "gradual"
+    assert found.second is not None
+    assert {found.cause, found.second.cause.name} == set(names)
+    assert not found.flagged

@@ -158,5 +158,6 @@ def best_pair(
         return None, beyond
     limit = best.log_evidence - DISTINCT
     alike = [p for p in pairs if p.second == best.second and p.log_evidence > limit]
-    firsts = tuple(p.first.cause.name for p in alike) if len(alike) > 1 else ()
-    return (best, left, firsts), beyond
+    # Two forms of one cause are one name.
+    firsts = tuple(dict.fromkeys(p.first.cause.name for p in alike))
+    return (best, left, firsts if len(firsts) > 1 else ()), beyond

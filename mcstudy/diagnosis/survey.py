@@ -149,6 +149,9 @@ def survey(
         # Near the data the better of the points is enough.
         k = int(np.argmin(misfits))
         few, centres = [few[k]], [centres[k]]
+    # A threshold between two coarse levels may be without effect at the one and hide the data at
+    # the other.
+    fine = weight < FAR or (form.size == 1 and not problem.dear)
     best: list[_Trial] = []
     rest: list[_Trial] = []
     changes = 0.0
@@ -157,9 +160,6 @@ def survey(
         without = solve(centre, centre.residuals, weight)[1]
         lowest = min(lowest, without)
         tried: dict[float, _Trial] = {}
-        # A threshold between two coarse levels may be without effect at the one and hide the data
-        # at the other.
-        fine = weight < FAR or (form.size == 1 and not problem.dear)
         for scores in score_grid(form, fine=fine):
             start = Scores(np.concatenate([centre.scores.shared, scores]), centre.scores.own)
             seen = observe_tests(part, (*forms, form), places, start)

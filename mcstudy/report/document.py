@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from mcstudy.figures.style import png_bytes
 
 LONGEST = 32
-"""Characters of a cell that is set as a number."""
+"""Characters of a cell that is kept on one line."""
 BEGINNINGS = tuple("–-0123456789")
 """First characters of one."""
 
@@ -66,7 +66,7 @@ def render(title: str, subtitle: str, sections: Sequence[Section]) -> str:
     """
     source = files("mcstudy.report").joinpath("template.html").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    environment.globals["is_number"] = is_number
+    environment.globals.update(is_number=is_number, longest=LONGEST)
     shown = [
         {
             "heading": section.heading,

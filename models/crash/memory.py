@@ -1,18 +1,18 @@
 """Crashes kept for runs that differ only in how the signals were recorded."""
 
-from collections import OrderedDict
 from collections.abc import Hashable, Mapping
 from dataclasses import replace
 
 from models.crash.outcome import Raw
 from models.effects.chain import EffectChain
+from models.recent import Recent
 
 MOST = 64
 """Crashes kept in a process, some 2 MB each: those of one Jacobian of about ten tests."""
 
 _Key = tuple[Hashable, tuple[tuple[str, float], ...]]
-_KEPT: OrderedDict[_Key, Raw | str] = OrderedDict()
-"""Crashes of all models by setup and inputs, the latest last."""
+_KEPT: Recent[_Key, Raw | str] = Recent(MOST)
+"""Crashes of all models by setup and inputs."""
 
 
 class CrashMemory:
@@ -40,12 +40,10 @@ class CrashMemory:
         values : mapping of str to float
             All inputs by name.
         """
-        key = self._key(setup, values)
-        found = _KEPT.get(key)
-        if found is None:
-            return None
-        _KEPT.move_to_end(key)
-        return found if isinstance(found, str) else replace(found, values=values, chain=self._chain)
+        found = _KEPT.get(self._key(setup, values))
+        if found is None or isinstance(found, str):
+            return found
+        return replace(found, values=values, chain=self._chain)
 
     def keep(self, setup: Hashable, values: Mapping[str, float], crash: Raw | str) -> None:
         """Keep a crash, or the status that prevented it.
@@ -62,10 +60,7 @@ class CrashMemory:
         """
         if not isinstance(crash, str):
             crash = replace(crash, record=crash.record.copy(), frames=crash.frames.copy())
-        _KEPT[self._key(setup, values)] = crash
-        if len(_KEPT) > MOST:
-            _KEPT.popitem(last=False)
+        _KEPT.put(self._key(setup, values), crash)
 
     def _key(self, setup: Hashable, values: Mapping[str, float]) -> _Key:
-        acting = (item for item in values.items() if item[0] not in self._chain.recorded)
-        return setup, tuple(acting)
+        return setup, tuple(self._chain.acting(values).items())

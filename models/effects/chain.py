@@ -45,9 +45,19 @@ class EffectChain:
             )
         return subject
 
+    def acting(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return the inputs that change a run, not only how it is recorded, by name.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            All inputs by name.
+        """
+        return {name: value for name, value in values.items() if name not in self._recorded}
+
     @functools.cached_property
-    def recorded(self) -> frozenset[str]:
-        """Inputs that change how a run is recorded, not the run: parameters of signal effects."""
+    def _recorded(self) -> frozenset[str]:
+        """Parameters of effects on the signal."""
         return frozenset(
             effect.input_name(name)
             for effect in self.effects

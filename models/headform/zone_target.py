@@ -2,7 +2,6 @@
 
 import hashlib
 import math
-from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -46,6 +45,7 @@ from models.headform.target import (
     write_law,
 )
 from models.protocol import Input
+from models.recent import Recent
 from models.vehicle.profile import load_vehicle
 
 Array = NDArray[np.float64]
@@ -53,8 +53,6 @@ Array = NDArray[np.float64]
 
 LEFT = 0.005
 """s without contact after which a headform has left a part of the hood that moves on its own."""
-
-
 MOST = 64
 """Impacts kept, some 10 kB each: those that differ only in how they are recorded share one."""
 MOTION = frozenset({"impact_speed", "impact_angle"})
@@ -103,8 +101,8 @@ class ZoneTarget:
         zone: str,
     ) -> None:
         self._skin = skin
-        self._kept: OrderedDict[tuple[float, ...], Strike] = OrderedDict()
-        self._last: tuple[tuple[float, ...], _Hood] | None = None
+        self._strikes: Recent[tuple[float, ...], Strike] = Recent(MOST)
+        self._hoods: Recent[tuple[float, ...], _Hood] = Recent(1)
         self._curve: ForceCurve | None = None
         self._corridor: Corridor | None = None
         self.digest = ""
@@ -163,17 +161,13 @@ class ZoneTarget:
         impactor : Impactor
             The headform.
         """
-        acting = {name: value for name, value in values.items() if name not in chain.recorded}
+        acting = chain.acting(values)
         key = tuple(acting.values())
-        kept = self._kept.get(key)
-        if kept is not None:
-            self._kept.move_to_end(key)
-            return kept
-        found = self._step(acting, self._hood(acting, chain, impactor.mass), impactor)
-        self._kept[key] = found
-        if len(self._kept) > MOST:
-            self._kept.popitem(last=False)
-        return found
+        struck = self._strikes.get(key)
+        if struck is None:
+            struck = self._step(acting, self._hood(acting, chain, impactor.mass), impactor)
+            self._strikes.put(key, struck)
+        return struck
 
     def _step(self, values: Mapping[str, float], hood: _Hood, impactor: Impactor) -> Strike:
         """Return the impact on a hood."""
@@ -205,8 +199,9 @@ class ZoneTarget:
     def _hood(self, values: Mapping[str, float], chain: EffectChain, mass: float) -> _Hood:
         """Return what is struck, that of the last impact where only the speed is another."""
         key = (mass, *(value for name, value in values.items() if name not in MOTION))
-        if self._last is not None and self._last[0] == key:
-            return self._last[1]
+        kept = self._hoods.get(key)
+        if kept is not None:
+            return kept
         curve = self.hood_curve(values, chain)
         contact = chain.act(
             "contact",
@@ -231,7 +226,7 @@ class ZoneTarget:
             curve.unloading_growth, curve.unloading_curvature,
         )  # fmt: skip
         built = _Hood(laws, count, stride, surface, part, curve.unloading_ratio)
-        self._last = (key, built)
+        self._hoods.put(key, built)
         return built
 
 

@@ -16,10 +16,10 @@ Array = NDArray[np.float64]
 
 ACCELERATION, GAIN = "head_acceleration", "sensor_gain_factor"
 """Signal that the effects on readings change, and the input that scales what its sensor feels."""
-PLAIN = Channel()
-"""Of a channel that the model declares nothing about."""
 STEP = 0.005
 """Relative change of it in a finite difference."""
+PLAIN = Channel()
+"""Of a channel that the model declares nothing about."""
 
 
 def channel_units(model: Model, names: Collection[str]) -> dict[str, str]:

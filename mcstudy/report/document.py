@@ -13,7 +13,7 @@ from mcstudy.figures.style import png_bytes
 LONGEST = 32
 """Characters of a cell that is kept on one line."""
 BEGINNINGS = tuple("–-0123456789")
-"""First characters of one."""
+"""First characters of a cell that is set as a number."""
 
 
 @dataclass(frozen=True)
@@ -26,12 +26,14 @@ class Table:
 
     @property
     def numbers(self) -> frozenset[int]:
-        """Columns, the first one aside, that hold nothing but numbers."""
+        """Columns, the first one aside, of nothing but numbers: short, and they begin like one."""
         columns = [
             [row[k] for row in self.rows if k < len(row) and row[k]] for k in range(len(self.head))
         ]
         return frozenset(
-            k for k, cells in enumerate(columns) if k and cells and all(map(is_number, cells))
+            k
+            for k, cells in enumerate(columns)
+            if k and cells and all(len(c) <= LONGEST and c.startswith(BEGINNINGS) for c in cells)
         )
 
 
@@ -50,11 +52,6 @@ class Section:
     pages: Mapping[str, str] = field(default_factory=dict)
 
 
-def is_number(cell: str) -> bool:
-    """Return whether a cell is set as a number: a short one that begins like one."""
-    return len(cell) <= LONGEST and cell[:1] in BEGINNINGS
-
-
 def render(title: str, subtitle: str, sections: Sequence[Section]) -> str:
     """Return the HTML of a report; all text is escaped.
 
@@ -66,7 +63,7 @@ def render(title: str, subtitle: str, sections: Sequence[Section]) -> str:
     """
     source = files("mcstudy.report").joinpath("template.html").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    environment.globals.update(is_number=is_number, longest=LONGEST)
+    environment.globals["longest"] = LONGEST
     shown = [
         {
             "heading": section.heading,

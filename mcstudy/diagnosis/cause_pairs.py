@@ -141,23 +141,19 @@ def best_pair(
     if not pairs:
         return None, 0.0
     best = max(pairs, key=lambda pair: pair.log_evidence)
-    sole = best.first.log_evidence
-    beyond = best.log_evidence - candidates[0].log_evidence
-    # Beside another form of the best cause a second one adds what that form lacked, too.
-    other = best.first.cause is candidates[0].cause and best.first is not candidates[0]
-    added = beyond if other else best.seconds[0].log_evidence
-    if len(indistinguishable(best.seconds)) > MAX_SECONDS:
+    sole = candidates[0].log_evidence
+    beyond = best.log_evidence - sole
+    near = [p for p in pairs if p.log_evidence > best.log_evidence - DISTINCT]
+    if any(len(indistinguishable(pair.seconds)) > MAX_SECONDS for pair in near):
         return None, beyond
     left = examine(problem, layouts, best.seconds[0].fitted, best.log_evidence)
-    enough = added >= _needed(sole, alone)
+    enough = beyond >= _needed(sole, alone)
     if left.p_value < STRUCTURE:
         # The form of a large effect is never quite right: what it leaves may be a rest.
         most = left.left <= (1.0 - ENOUGH) * alone.left
-        enough = (enough and most) or (left.share >= NEARLY_ALL and added >= NOTABLE * sole)
+        enough = (enough and most) or (left.share >= NEARLY_ALL and beyond >= NOTABLE * sole)
     if not enough:
         return None, beyond
-    limit = best.log_evidence - DISTINCT
-    alike = [p for p in pairs if p.second == best.second and p.log_evidence > limit]
     # Two forms of one cause are one name.
-    firsts = tuple(dict.fromkeys(p.first.cause.name for p in alike))
+    firsts = tuple(dict.fromkeys(p.first.cause.name for p in near if p.second == best.second))
     return (best, left, firsts if len(firsts) > 1 else ()), beyond

@@ -41,7 +41,7 @@ class Centre:
     def of_tests(self, chosen: Sequence[int]) -> "Centre":
         """Return the linearised model of some of its tests."""
         return Centre(
-            Scores(self.scores.shared, tuple(self.scores.own[i] for i in chosen)),
+            self.scores.of_tests(chosen),
             tuple(self.residuals[i] for i in chosen),
             Slopes(
                 tuple(self.slopes.doubtful[i] for i in chosen),

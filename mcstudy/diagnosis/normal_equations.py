@@ -28,6 +28,10 @@ class Scores:
     shared: Array
     own: tuple[Array, ...]
 
+    def of_tests(self, chosen: Sequence[int]) -> "Scores":
+        """Return the latents of some of the tests."""
+        return Scores(self.shared, tuple(self.own[i] for i in chosen))
+
 
 @dataclass(frozen=True)
 class Step:

@@ -73,12 +73,16 @@ def weight_of(samples: int, misfit: float) -> float:
 
 @dataclass(frozen=True)
 class _Trial:
-    """Latents that a fit may start from: as moved by the linear model, and before."""
+    """Latents that a fit may start from: as moved by the linear model, and before.
+
+    With the misfit of the linear model at the one, and on the surveyed tests at the other.
+    """
 
     cost: float
     moved: Scores
     still: Scores
     slopes: Slopes
+    still_misfit: float
 
 
 @dataclass(frozen=True)
@@ -189,7 +193,8 @@ def survey(
             # One start a value of the first parameter, where or when the cause sets in.
             place = float(scores[0]) if scores.size else 0.0
             if place not in tried or cost < tried[place].cost:
-                tried[place] = _Trial(cost, moved, still, whole.slopes)
+                at_rest = misfit_of(places, seen, start, scatter, weight)
+                tried[place] = _Trial(cost, moved, still, whole.slopes, at_rest)
         ranked = sorted(tried.values(), key=lambda entry: entry.cost)
         best += ranked[:1]
         rest += ranked[1:]
@@ -198,21 +203,37 @@ def survey(
     best.sort(key=lambda entry: entry.cost)
     rest.sort(key=lambda entry: entry.cost)
     cheapest = best[0].cost
-    confirm = partial(_confirm, problem, layouts, (*forms, form), scatter, weight)
     if weight >= FAR and not problem.dear:
         # Nuisances that took a misfit on mislead the linear model: runs decide between the starts.
-        ranked = sorted(best + rest, key=lambda entry: confirm(entry)[0])
+        def by_runs(entry: _Trial) -> float:
+            moved = entry.moved.of_tests(chosen)
+            run = _misfit_by_runs(part, places, (*forms, form), scatter, weight, moved)
+            return min(run, entry.still_misfit)
+
+        ranked = sorted(best + rest, key=by_runs)
         best, rest = ranked[:1], ranked[1:]
+    confirm = partial(_confirm, problem, layouts, (*forms, form), scatter, weight)
     starts = tuple(
-        (confirm(entry)[1], entry.slopes)
-        for entry in best
-        if entry.cost < RIVAL_START * best[0].cost
+        (confirm(entry), entry.slopes) for entry in best if entry.cost < RIVAL_START * best[0].cost
     )
     # Steps of the grid are too large for a small effect in data of little noise.
     reached = min(cheapest, expected) if weight >= FAR else cheapest
     promise = max(lowest - expected, 0.0)
     spare = tuple(rest[:SPARE])
     return Survey(form, scatter, weight, times * reached, times * promise, starts, spare)
+
+
+def _misfit_by_runs(
+    problem: Problem,
+    layouts: Sequence[Layout],
+    forms: tuple[Form, ...],
+    scatter: Scatter,
+    weight: float,
+    scores: Scores,
+) -> float:
+    """Return the misfit of a model at latents by runs; infinity if one of them fails."""
+    seen = observe_tests(problem, forms, layouts, scores)
+    return np.inf if seen is None else misfit_of(layouts, seen, scores, scatter, weight)
 
 
 def _confirm(
@@ -222,16 +243,13 @@ def _confirm(
     scatter: Scatter,
     weight: float,
     tried: _Trial,
-) -> tuple[float, Scores]:
-    """Return the misfit by runs at a start, and the start: as moved by the linear model or before.
+) -> Scores:
+    """Return the start with the smaller misfit by runs: as moved by the linear model or before.
 
     The model leads astray where a parameter lies near the end of its range, or the move is long.
     """
-    found = []
-    for scores in (tried.moved, tried.still):
-        seen = observe_tests(problem, forms, layouts, scores)
-        found.append(np.inf if seen is None else misfit_of(layouts, seen, scores, scatter, weight))
-    return min(found), tried.moved if found[0] <= found[1] else tried.still
+    by_runs = partial(_misfit_by_runs, problem, layouts, forms, scatter, weight)
+    return min((tried.moved, tried.still), key=by_runs)
 
 
 def _spread(layouts: Sequence[Layout]) -> list[int]:
@@ -322,7 +340,7 @@ def approach(
     for tried in () if surveyed.far else surveyed.spare:
         if best is not None and best.misfit <= enough:
             break
-        _, start = _confirm(problem, layouts, forms, surveyed.scatter, surveyed.weight, tried)
+        start = _confirm(problem, layouts, forms, surveyed.scatter, surveyed.weight, tried)
         found = _come_near(problem, layouts, forms, surveyed, start, tried.slopes)
         if found is not None and (best is None or found.log_evidence > best.log_evidence):
             best = found

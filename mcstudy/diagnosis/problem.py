@@ -159,6 +159,11 @@ class Form:
     named: bool = True
 
     @property
+    def is_free(self) -> bool:
+        """Whether the form is a table that stands for any formula of its cause."""
+        return not self.named and self.trend is None
+
+    @property
     def size(self) -> int:
         """Number of latents."""
         return len(self.free) + (self.trend is not None)

@@ -12,7 +12,6 @@ from mcstudy.diagnosis.jacobian import shared_names
 from mcstudy.diagnosis.layout import Layout
 from mcstudy.diagnosis.model_selection import (
     DISTINCT,
-    MAX_SHARE,
     STRUCTURE,
     WIDENING,
     Candidate,
@@ -243,7 +242,7 @@ def _judge(
         )
     if clean:
         return alone
-    if share >= MAX_SHARE:
+    if best.names(share):
         return flagged
     return replace(nothing, remainder=left, why="structure remains beside the best cause")
 

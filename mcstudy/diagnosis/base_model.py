@@ -2,8 +2,8 @@
 
 from mcstudy.diagnosis.fit import Fit, fit, start_scores
 from mcstudy.diagnosis.layout import Layout, lay_out
-from mcstudy.diagnosis.model_selection import rescale
 from mcstudy.diagnosis.problem import Problem
+from mcstudy.diagnosis.repeatability import rescale
 from mcstudy.diagnosis.roughness import measure_roughness, widen
 from mcstudy.diagnosis.screening import estimate_scatter
 from mcstudy.diagnosis.survey import FAR, SCAN, weight_of

@@ -15,9 +15,9 @@ from mcstudy.diagnosis.discrepancy import Discrepancy, fit_discrepancy
 from mcstudy.diagnosis.fit import Fit, FitError, fit
 from mcstudy.diagnosis.jacobian import Slopes, expand_tests, observe_tests
 from mcstudy.diagnosis.layout import Layout, Scatter
-from mcstudy.diagnosis.model_selection import settle
 from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Problem
+from mcstudy.diagnosis.repeatability import settle
 from mcstudy.diagnosis.screening import estimate_scatter
 from mcstudy.diagnosis.templates import smooth_discrepancy
 from mcstudy.statistics import Estimate, crps

@@ -3,31 +3,21 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
-from mcstudy.diagnosis.fit import Fit, fit
+from mcstudy.diagnosis.cause_fits import KEPT, fit_forms
+from mcstudy.diagnosis.fit import Fit
 from mcstudy.diagnosis.jacobian import shared_names
-from mcstudy.diagnosis.layout import Layout, Scatter
+from mcstudy.diagnosis.layout import Layout
 from mcstudy.diagnosis.linear_model import linearise, solve
 from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Cause, Form, Problem
-from mcstudy.diagnosis.screening import estimate_scatter, remaining
+from mcstudy.diagnosis.repeatability import rescale, settle, with_given_scatter
+from mcstudy.diagnosis.screening import remaining
 from mcstudy.diagnosis.shortlist import shortlist
-from mcstudy.diagnosis.survey import (
-    CLOSE,
-    FAR,
-    Survey,
-    approach,
-    may_win,
-    scan_scatter,
-    survey,
-    temper,
-    weight_of,
-)
+from mcstudy.diagnosis.survey import FAR, scan_scatter, weight_of
 from mcstudy.diagnosis.templates import (
     Template,
     cause_templates,
@@ -37,9 +27,6 @@ from mcstudy.diagnosis.templates import (
     smooth_discrepancy,
 )
 from mcstudy.execution.workers import run_jobs
-
-Array = NDArray[np.float64]
-_Found = TypeVar("_Found", Survey, Fit)
 
 DISTINCT = 3.0
 """Log evidence within which causes are indistinguishable, and below which none is named."""
@@ -56,24 +43,14 @@ FREE_FACTOR, FREE_POWER = 0.4, 0.7
 misfit: the larger it is, the closer a free form follows the right cause (on hidden sets foreign
 forms of the right cause leave at most two thirds of it, a rupture, which is in no catalogue, more
 than it)."""
-PRUNING_RATIO = 1.5
-"""Factor on the best negative log posterior beyond which a form is pruned."""
 FAR_BEHIND, HALF = 200.0, 0.5
 """Log units, and share of what the best form gains, by which a form may lie behind it before all
 are compared at one repeatability."""
-LITTLE = 0.1
-"""Share of what the best form gains that another one must gain to be fitted on."""
+BEHIND_DEAR = 30.0
+"""These log units where runs are dear: each form has its own most probable repeatability by
+then, so that another one hardly takes it nearer to the best."""
 ROUNDS = 3
 """Rounds in which the repeatability of the best form is estimated again."""
-KEPT = 2.0
-"""Factor by which a form near the data may add more than it promises."""
-BEHIND_DEAR = 30.0
-"""The same log units where runs are dear: each form has its own most probable repeatability by
-then, so that another one hardly takes it nearer to the best."""
-MAX_CAUSES = 5
-"""Causes, far from the data, of which all forms are fitted."""
-MIN_COUNT, MIN_DEAR = 6, 2
-"""Forms that are refitted whatever their expected gain, and of models whose runs are dear."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +81,8 @@ class Candidate:
         if not any(form.is_free for form in self.cause.forms):
             return True
         whole = self.log_evidence / explained
-        return whole - self.log_evidence <= FREE_FACTOR * whole**FREE_POWER
+        most: float = FREE_FACTOR * whole**FREE_POWER
+        return whole - self.log_evidence <= most
 
 
 @dataclass(frozen=True)
@@ -123,78 +101,6 @@ class Remainder:
     share: float
     left: float
     drift: tuple[str, float]
-
-
-def settle(
-    problem: Problem, layouts: Sequence[Layout], fitted: Fit, *, absorbing: bool = False
-) -> Fit:
-    """Return a fit with its repeatability re-estimated.
-
-    A discrepancy that all tests share, or that changes with their regime or order, stays free
-    meanwhile: the repeatability has mean zero and may not absorb what is common.
-
-    Parameters
-    ----------
-    problem : Problem
-    layouts : sequence of Layout
-        Of the tests.
-    fitted : Fit
-        Fit to start from.
-    absorbing : bool
-        Leave no discrepancy free, so that what the model gets wrong widens its predictions.
-    """
-    shapes = None if absorbing else smooth_discrepancy(layouts, fitted)
-    scatter = estimate_scatter(fitted, layouts, shapes)
-    start = rescale(layouts, fitted, scatter)
-    return fit(problem, layouts, fitted.forms, start, scatter, fitted.slopes, exact=False)
-
-
-def with_given_scatter(
-    problem: Problem,
-    layouts: Sequence[Layout],
-    scatter: Scatter,
-    fitted: Fit,
-    *,
-    exact: bool = False,
-) -> Fit:
-    """Return a fit with a given repeatability, so that it does not absorb a misfit.
-
-    Parameters
-    ----------
-    problem : Problem
-    layouts : sequence of Layout
-        Of the tests.
-    scatter : Scatter
-        Repeatability to use.
-    fitted : Fit
-        Fit to start from.
-    exact : bool
-        Whether the final Jacobian must be that of the most probable latents.
-    """
-    if scatter == fitted.scatter and not exact:
-        return fitted
-    start = rescale(layouts, fitted, scatter)
-    return fit(problem, layouts, fitted.forms, start, scatter, fitted.slopes, exact=exact)
-
-
-def rescale(layouts: Sequence[Layout], fitted: Fit, scatter: Scatter) -> Scores:
-    """Return a fit's latents for another repeatability; the pulses stay the same within +-3.
-
-    Parameters
-    ----------
-    layouts : sequence of Layout
-        Of the tests.
-    fitted : Fit
-    scatter : Scatter
-        Repeatability to rescale to.
-    """
-    own = []
-    for layout, scores in zip(layouts, fitted.scores.own, strict=True):
-        moved = scores.copy()
-        ratio = layout.scatter_sizes(fitted.scatter) / layout.scatter_sizes(scatter)
-        moved[layout.scattering] = np.clip(scores[layout.scattering] * ratio, -3.0, 3.0)
-        own.append(moved)
-    return Scores(fitted.scores.shared, tuple(own))
 
 
 def rank_causes(
@@ -251,38 +157,20 @@ def rank_causes(
         # Near the data a survey finds what the templates promise.
         floor = needed / KEPT if weight >= FAR else 0.0
         forms = shortlist(centres[-1], weight, bank, forms, floor)
-    scans = run_jobs(partial(survey, problem, layouts, base.forms, centres, scan), forms, workers)
-    seen = sorted((s for s in scans if s is not None), key=lambda s: s.misfit)
-    best = max((s.promise for s in seen), default=0.0)
-    if problem.dear and needed > 0.0:
-        seen = [s for s in seen if s.far or KEPT * s.promise > needed]
-    least = MIN_DEAR if problem.dear else MIN_COUNT
-    promising = [
-        s for k, s in enumerate(seen[:most]) if k < least or may_win(s, seen[0].misfit, best)
-    ]
-    # Far from the data one form of a cause may start badly and end best.
-    fully = [s for s in promising if not problem.dear or may_win(s, seen[0].misfit, best)]
-    chosen = list(dict.fromkeys(s.form.cause for s in fully))[:MAX_CAUSES]
-    held = {(s.form.cause, s.form.name) for s in promising}
-    promising += [
-        s
-        for s in seen
-        if s.far and s.form.cause in chosen and (s.form.cause, s.form.name) not in held
-    ]
-    if not promising:
+    together = [forms]
+    if problem.dear:
+        # Tables and trends are dear, and not needed where a formula explains everything.
+        formulas = [form for form in forms if form.named]
+        together = [formulas, [form for form in forms if not form.named]]
+    settled: list[Fit] = []
+    for part in together:
+        if settled and not _leaves_structure(problem, layouts, base, settled):
+            break
+        settled += fit_forms(
+            problem, layouts, base, centres, scan, part, most=most, needed=needed, workers=workers
+        )
+    if not settled:
         return []
-    tempered = run_jobs(partial(temper, problem, layouts, base.forms), promising, workers)
-    nearer = [s for s in tempered if s is not None]
-    if nearer and nearer[0].far:
-        nearer = _gaining(nearer, solve(centres[-1], centres[-1].residuals, nearer[0].weight)[1])
-    without = solve(centres[-1], centres[-1].residuals, 1.0)[1]
-    first = run_jobs(partial(approach, problem, layouts, base.forms, without), nearer, workers)
-    reached = [found for found in first if found is not None]
-    lowest = min((found.misfit for found in reached), default=0.0)
-    # Forms far behind the best are pruned before their repeatability is re-estimated.
-    kept = [found for found in reached if found.misfit < PRUNING_RATIO * lowest + CLOSE]
-    kept = _gaining(kept, without)
-    settled = run_jobs(partial(settle, problem, layouts), kept, workers)
     top = max([base, *settled], key=lambda fitted: fitted.log_evidence)
     # What a fit from far away still left was taken for repeatability.
     for _ in range(ROUNDS):
@@ -319,19 +207,13 @@ def rank_causes(
     return sorted(candidates, key=lambda candidate: -candidate.log_evidence)
 
 
-def _gaining(found: Sequence[_Found], without: float) -> list[_Found]:
-    """Return those that gain a share of what the best one does; all where little is gained.
-
-    Parameters
-    ----------
-    found : sequence of Survey or of Fit
-        With their misfits.
-    without : float
-        Misfit without any of them.
-    """
-    best = min((entry.misfit for entry in found), default=0.0)
-    behind = max(CLOSE, (1.0 - LITTLE) * (without - best))
-    return [entry for entry in found if entry.misfit <= best + behind]
+def _leaves_structure(
+    problem: Problem, layouts: Sequence[Layout], base: Fit, settled: Sequence[Fit]
+) -> bool:
+    """Return whether the best of some fits leaves structure in the residuals."""
+    best = max(settled, key=lambda fitted: fitted.log_evidence)
+    left = examine(problem, layouts, best, best.log_evidence - base.log_evidence)
+    return left.p_value < STRUCTURE
 
 
 def indistinguishable(candidates: Sequence[Candidate], left: float = 0.0) -> tuple[str, ...]:

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcstudy.diagnosis.gain import Gain, Quantities, Quantity, measure_gain
-from mcstudy.diagnosis.model_selection import Candidate, with_given_scatter
+from mcstudy.diagnosis.model_selection import Candidate
 from mcstudy.diagnosis.power import minimum_detectable_effects, value_of_information
 from mcstudy.diagnosis.problem import Cause, Problem
 from mcstudy.diagnosis.regions import locate_misfit
+from mcstudy.diagnosis.repeatability import with_given_scatter
 from mcstudy.diagnosis.screening import is_at_bound
 from mcstudy.diagnosis.search import Finding, search
 from mcstudy.errors import UserError

@@ -13,9 +13,10 @@ from mcstudy.diagnosis.base_model import fit_base
 from mcstudy.diagnosis.fit import Fit, fit, start_scores
 from mcstudy.diagnosis.layout import Layout, Scatter, lay_out
 from mcstudy.diagnosis.marginal import Marginal, log_bayes_factor, quadratic_form
-from mcstudy.diagnosis.model_selection import examine, rank_causes, settle
+from mcstudy.diagnosis.model_selection import examine, rank_causes
 from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Observation, Problem, Scalar, Signal, Test
+from mcstudy.diagnosis.repeatability import settle
 from mcstudy.diagnosis.search import UNEXPLAINED, search
 
 SCATTER = Scatter(0.01, 0.003)

@@ -13,8 +13,9 @@ from mcstudy.diagnosis.discrepancy import fit_discrepancy
 from mcstudy.diagnosis.fit import Fit
 from mcstudy.diagnosis.gain import Gain, measure_gain
 from mcstudy.diagnosis.layout import Layout
-from mcstudy.diagnosis.model_selection import rank_causes, settle
+from mcstudy.diagnosis.model_selection import rank_causes
 from mcstudy.diagnosis.problem import Problem
+from mcstudy.diagnosis.repeatability import settle
 from mcstudy.diagnosis.templates import smooth_discrepancy
 from studies.diagnosis.words import gain_words
 

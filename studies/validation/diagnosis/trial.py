@@ -17,8 +17,8 @@ from mcstudy.diagnosis.base_model import fit_base
 from mcstudy.diagnosis.fit import fit
 from mcstudy.diagnosis.gain import Quantities, measure_gain
 from mcstudy.diagnosis.layout import Scatter
-from mcstudy.diagnosis.model_selection import rescale
 from mcstudy.diagnosis.problem import Problem
+from mcstudy.diagnosis.repeatability import rescale
 from mcstudy.diagnosis.screening import POWER
 from mcstudy.diagnosis.search import Finding, names_of, search
 from mcstudy.measurement.measured_data import Measured, load_measured

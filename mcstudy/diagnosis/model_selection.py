@@ -164,8 +164,8 @@ def rank_causes(
         together = [formulas, [form for form in forms if not form.named]]
     settled: list[Fit] = []
     for part in together:
-        if settled and not _leaves_structure(problem, layouts, base, settled):
-            break
+        if not part or (settled and not _leaves_structure(problem, layouts, base, settled)):
+            continue
         settled += fit_forms(
             problem, layouts, base, centres, scan, part, most=most, needed=needed, workers=workers
         )

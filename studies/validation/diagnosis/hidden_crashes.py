@@ -72,13 +72,14 @@ def make_crashes(
         Model that the folder names to be diagnosed, by default the same.
     """
     rng = np.random.default_rng(seed)
-    options: dict[str, Any] = {"channel_class": 0.0, "hood_curve": _curve(hidden)}
-    reality = load_model(model, options)
-    nominal = {item.name: np.full(tests, item.nominal) for item in reality.inputs}
     speeds = np.linspace(*SPEEDS, tests)
     rng.shuffle(speeds)
+    scale = float(np.exp(HOOD_SD * rng.standard_normal()))
+    options: dict[str, Any] = {"channel_class": 0.0, "hood_curve": _curve(hidden, scale)}
+    reality = load_model(model, options)
+    nominal = {item.name: np.full(tests, item.nominal) for item in reality.inputs}
     given = nominal | {"impact_speed": speeds}
-    given["hood_force_scale"] = np.full(tests, np.exp(HOOD_SD * rng.standard_normal()))
+    given["hood_force_scale"] = np.full(tests, scale)
     true = alter({name: values.copy() for name, values in given.items()}, hidden)
     (folder / "signals").mkdir(parents=True)
     rows = []
@@ -116,23 +117,24 @@ def _crash(reality: Model, inputs: Mapping[str, float]) -> tuple[Array, Array, d
     return signals.head_time, true, reality._judge(raw, signals)[1]
 
 
-def _curve(hidden: Sequence[Hidden]) -> list[list[float]]:
-    """Return the hood's loading curve as it truly is."""
+def _curve(hidden: Sequence[Hidden], scale: float) -> list[list[float]]:
+    """Return the hood's loading curve as it truly is, before a scale of its forces."""
     x, force = np.array(HOOD).T
     bottom, plateau = find(hidden, "hood_bottoming"), find(hidden, "hood_yield")
     more: Sequence[float] | Array = (
         [] if bottom is None else bottom.numbers["clearance"] + np.array([0.0, 0.006, 0.015])
     )
+    # The hood yields at a force, whatever the scale.
+    yielding = np.inf if plateau is None else plateau.numbers["force"] / scale
     if plateau is not None:
-        more = [float(np.interp(plateau.numbers["force"], force, x))]
+        more = [float(np.interp(yielding, force, x))]
     depth = np.unique(np.concatenate([x, more]))
     true = np.interp(depth, x, force)
     if bottom is not None:
         beyond = np.maximum(0.0, depth - bottom.numbers["clearance"])
         true = true + bottom.numbers["stiffness"] * beyond**1.5 / 0.1
-    if (h := plateau) is not None:
-        above = np.maximum(0.0, true - h.numbers["force"])
-        true = true - (1.0 - h.numbers["remaining"]) * above
+    if plateau is not None:
+        true = true - (1.0 - plateau.numbers["remaining"]) * np.maximum(0.0, true - yielding)
     knots: list[list[float]] = np.stack([depth, true], axis=1).tolist()
     return knots
 

@@ -39,10 +39,9 @@ NAMED_SHARE = 0.9
 """Explained share of the misfit above which a cause is named despite remaining structure (on hidden
 sets filters of other families and saturations with recovery reach 91 to 99 %)."""
 FREE_FACTOR, FREE_POWER = 0.4, 0.7
-"""Largest misfit that a cause with a free form may leave, in log units, as a power of all the
-misfit: the larger it is, the closer a free form follows the right cause (on hidden sets foreign
-forms of the right cause leave at most two thirds of it, a rupture, which is in no catalogue, more
-than it)."""
+"""Largest misfit that a free form may leave, in log units, as a power of all the misfit: the larger
+it is, the closer a free form follows the right cause (on hidden sets foreign forms of the right
+cause leave at most two thirds of it, a rupture, which is in no catalogue, more than it)."""
 FAR_BEHIND, HALF = 200.0, 0.5
 """Log units, and share of what the best form gains, by which a form may lie behind it before all
 are compared at one repeatability."""
@@ -78,7 +77,7 @@ class Candidate:
         """
         if explained < NAMED_SHARE:
             return False
-        if not any(form.is_free for form in self.cause.forms):
+        if not self.form.is_free:
             return True
         whole = self.log_evidence / explained
         most: float = FREE_FACTOR * whole**FREE_POWER

@@ -190,8 +190,9 @@ def validate(
     if full_scale:
         target = ResultsFolder(out or Path("results/validation_full_scale"))
         found = full.validate_full_scale(
-            target, Path("configs/accidents.toml"), sets=full_scale, workers=workers
-        )
+            target, Path("configs/accidents.toml"), sets=full_scale, workers=workers,
+            quiet=quiet or as_json,
+        )  # fmt: skip
         print_analysis(found, full.summarise(found), target.path, quiet=quiet, as_json=as_json)
         return
 

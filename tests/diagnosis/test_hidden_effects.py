@@ -15,10 +15,11 @@ from studies.diagnosis.causes import causes_of
 from studies.diagnosis.model_choice import choose_model
 from studies.diagnosis.problem import build_problem
 from studies.diagnosis.study import simulation_of
-from studies.validation.diagnosis import outcomes
 from studies.validation.diagnosis.drawing import CATALOGUE, KINDS, OUTSIDE, draw
+from studies.validation.diagnosis.full_scale import FullScaleOutcome, plan_full_scale
 from studies.validation.diagnosis.hidden_effects import make_tests
 from studies.validation.diagnosis.laboratory import CURVE, Hidden, Laboratory
+from studies.validation.diagnosis.outcomes import run_trials
 from studies.validation.diagnosis.tier import TARGETS, analyse, plan
 from studies.validation.diagnosis.trial import HeldOut, Outcome, Trial, run_trial
 
@@ -220,9 +221,7 @@ def test_rates_count_what_they_say() -> None:
     assert found["confusion"]["nothing"] == {"adequate": 1, "sensor_gain": 1}
 
 
-def test_an_interrupted_validation_goes_on_where_it_stopped(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupted_validation_goes_on_where_it_stopped(tmp_path: Path) -> None:
     tried: list[Trial] = []
 
     def run(trial: Trial) -> Outcome:
@@ -232,21 +231,35 @@ def test_an_interrupted_validation_goes_on_where_it_stopped(
         gains = {"inside": HeldOut(0.4, float("nan"), 0.9, 0.9)}
         return outcome_of(trial.kind, ("sensor_gain",), "sensor_gain", trial=trial, gains=gains)
 
-    monkeypatch.setattr(outcomes, "run_trial", run)
     trials = [Trial(k, "own form", force=False) for k in range(4)]
     with pytest.raises(KeyboardInterrupt):
-        outcomes.run_trials(tmp_path, trials, 1, quiet=True)
+        run_trials(tmp_path, trials, run, Outcome, 1, quiet=True)
     (file,) = tmp_path.iterdir()
     # The machine went down in the middle of a line.
     file.write_text(file.read_text() + '\n{"trial": {"se')
     tried.append(trials[0])
-    found = outcomes.run_trials(tmp_path, trials, 1, quiet=True)
+    found = run_trials(tmp_path, trials, run, Outcome, 1, quiet=True)
     assert tried[4:] == trials[2:]
     assert [outcome.trial for outcome in found] == trials
     assert found[0].gains["inside"].crps == 0.4
     assert np.isnan(found[0].gains["inside"].against_process)
-    assert len(list(outcomes.run_trials(tmp_path, trials, 1, quiet=True))) == 4
+    assert len(list(run_trials(tmp_path, trials, run, Outcome, 1, quiet=True))) == 4
     assert len(tried) == 6
+
+
+def test_kept_outcomes_of_full_scale_tests_are_those_that_ran(tmp_path: Path) -> None:
+    trials = plan_full_scale(["none", "hood_yield"], 2, 1, ("multibody", "planar"))
+    ran = [
+        FullScaleOutcome(t, "", None, (), False, 0.4, None, 1_620, 9.5, "adequate")
+        if t.cause == "none"
+        else FullScaleOutcome(t, "", t.cause, (t.cause,), True, 0.0, True, 7_380, 260.0, "one")
+        for t in trials
+    ]
+    by_trial = dict(zip(trials, ran, strict=True))
+    args = (tmp_path, trials)
+    first = run_trials(*args, by_trial.__getitem__, FullScaleOutcome, 1, quiet=True)
+    again = run_trials(*args, {}.__getitem__, FullScaleOutcome, 1, quiet=True)
+    assert first == again == ran
 
 
 def test_a_plan_has_every_kind_and_about_the_number_asked_for() -> None:

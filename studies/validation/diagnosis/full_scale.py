@@ -13,6 +13,7 @@ import numpy as np
 
 from mcstudy.diagnosis.problem import Cause, Observation, Problem, Simulate
 from mcstudy.diagnosis.search import Finding, names_of, search
+from mcstudy.execution.progress import say
 from mcstudy.execution.results import ResultsFolder
 from mcstudy.execution.workers import run_jobs
 from mcstudy.report import Section, Table
@@ -26,6 +27,7 @@ from studies.validation.diagnosis.drawing import ACCIDENTS, CRASHES, draw_of
 from studies.validation.diagnosis.hidden_accidents import make_accidents
 from studies.validation.diagnosis.hidden_crashes import make_crashes
 from studies.validation.diagnosis.laboratory import Hidden
+from studies.validation.diagnosis.outcomes import run_trials
 from studies.validation.diagnosis.trial import read_tests
 
 FIRST = 20_000
@@ -188,27 +190,6 @@ def plan_full_scale(
     ]
 
 
-def run_full_scale(
-    crashes: Sequence[FullScaleTrial],
-    accidents: Sequence[FullScaleTrial],
-    study_file: Path,
-    workers: int,
-) -> tuple[list[FullScaleOutcome], list[FullScaleOutcome]]:
-    """Return the outcomes of full-scale tests and of accident collections.
-
-    Parameters
-    ----------
-    crashes, accidents : sequence of FullScaleTrial
-    study_file : path
-        Monte Carlo study that the accidents are drawn from.
-    workers : int
-        Processes, -1 for one a core.
-    """
-    parts = [accidents[k::GROUPS] for k in range(GROUPS)]
-    found = run_jobs(partial(run_accidents, study_file=study_file), parts, workers)
-    return run_jobs(run_crashes, crashes, workers), [outcome for part in found for outcome in part]
-
-
 def _assess(
     trial: FullScaleTrial, hidden: Sequence[Hidden], problem: Problem, causes: Sequence[Cause]
 ) -> FullScaleOutcome:
@@ -248,9 +229,12 @@ def _covered(problem: Problem, finding: Finding, hidden: Sequence[Hidden]) -> bo
 
 
 def validate_full_scale(
-    folder: ResultsFolder, study_file: Path, *, sets: int, workers: int
+    folder: ResultsFolder, study_file: Path, *, sets: int, workers: int, quiet: bool = False
 ) -> dict[str, Any]:
     """Hide effects in full-scale tests and accident collections, diagnose them, write the report.
+
+    Full-scale tests that an interrupted validation of the same code left in the folder are not
+    diagnosed again.
 
     Parameters
     ----------
@@ -262,21 +246,25 @@ def validate_full_scale(
         Sets of each cause.
     workers : int
         Processes, -1 for one a core.
+    quiet : bool
+        No progress line.
     """
-    crashes, accidents = run_full_scale(
-        plan_full_scale(list(CRASHES), sets, FIRST, REALITIES),
-        plan_full_scale(list(ACCIDENTS), sets, FIRST),
-        study_file,
-        workers,
-    )
-    analysis = {
-        "crashes": [asdict(outcome) | {"right": outcome.right} for outcome in crashes],
-        "accidents": [asdict(outcome) | {"right": outcome.right} for outcome in accidents],
-    }
+    trials = plan_full_scale(list(CRASHES), sets, FIRST, REALITIES)
+    accidents = plan_full_scale(list(ACCIDENTS), sets, FIRST)
     with folder.open_for_writing():
+        crashes = run_trials(
+            folder.path, trials, run_crashes, FullScaleOutcome, workers, quiet=quiet
+        )
+        say(f"{len(accidents)} collections of accidents", quiet=quiet)
+        parts = [accidents[k::GROUPS] for k in range(GROUPS)]
+        found = run_jobs(partial(run_accidents, study_file=study_file), parts, workers)
+        analysis = {
+            "crashes": [asdict(o) | {"right": o.right} for o in crashes],
+            "accidents": [asdict(o) | {"right": o.right} for part in found for o in part],
+        }
         return publish(
             folder, "Diagnosis of full-scale tests and accidents",
-            f"{sets} sets of each cause from seed {FIRST} on", analysis, lambda _: {},
+            f"sets of each cause: {sets}, from seed {FIRST} on", analysis, lambda _: {},
             lambda held, _: [Section("Answers", [], summarise(held))],
         )  # fmt: skip
 
@@ -313,7 +301,7 @@ def _answers(rows: Sequence[Mapping[str, Any]]) -> list[list[str]]:
             [
                 cause,
                 f"{sum(row['right'] for row in part)} of {len(part)}",
-                f"{sum(covered)} of {len(covered)}",
+                f"{sum(covered)} of {len(covered)}" if covered else "–",
                 number(float(np.median([row["runs"] for row in part]))),
                 number(float(np.median([row["seconds"] for row in part]))),
                 ", ".join(f"{name} ({count})" for name, count in answers.most_common()),

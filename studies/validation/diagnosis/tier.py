@@ -17,7 +17,7 @@ from mcstudy.text import number, percent
 from mcstudy.typed_json import from_plain
 from studies.publishing import publish
 from studies.validation.diagnosis.outcomes import run_trials
-from studies.validation.diagnosis.trial import Outcome, Trial
+from studies.validation.diagnosis.trial import Outcome, Trial, run_trial
 
 SHARES = {
     ("none", False, True): 3,
@@ -135,7 +135,7 @@ def validate_diagnosis(
     # Sorted by seed, so that every kind is there from the start.
     trials.sort(key=lambda t: (t.seed, t.kind, t.force))
     with folder.open_for_writing():
-        outcomes = run_trials(folder.path, trials, workers, quiet=quiet)
+        outcomes = run_trials(folder.path, trials, run_trial, Outcome, workers, quiet=quiet)
         return publish(
             folder, "Validation of the diagnosis",
             f"{len(outcomes)} sets of tests from seed {SEED} on, effects hidden by an independent "

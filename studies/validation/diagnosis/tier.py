@@ -258,11 +258,11 @@ def summarise(analysis: Mapping[str, Any]) -> list[Table]:
          "met" if row["met"] else "within its interval" if row["allowed"] else "MISSED"]
         for row in analysis["rates"].values()
     ]  # fmt: skip
-    given = sorted({name for row in analysis["confusion"].values() for name in row})
     confused = [
-        [hidden, *(str(row.get(name, "")) for name in given)]
+        [hidden, str(sum(row.values())),
+         ", ".join(f"{name} ({row[name]})" for name in sorted(row, key=lambda name: -row[name]))]
         for hidden, row in analysis["confusion"].items()
-    ]
+    ]  # fmt: skip
     power = [
         [row["kind"], number(row["size"]), str(row["trials"]),
          *(percent(from_plain(Estimate, row[key])) for key in ("detected", "named"))]
@@ -286,7 +286,8 @@ def summarise(analysis: Mapping[str, Any]) -> list[Table]:
               "of 90 % intervals.",
               ["region", "sets", "gain", "against process", "coverage, base",
                "coverage, extended", "target"], gains),
-        Table("Confusion matrix: hidden (rows) and named (columns).", ["hidden", *given], confused),
+        Table("Answers by hidden effect: the first name, and in how many sets.",
+              ["hidden", "sets", "answers"], confused),
     ]  # fmt: skip
 
 

@@ -32,7 +32,7 @@ test: install  ## run the tests, on all cores
 	$(BIN)/python -m pytest -n auto --dist loadfile
 
 test-slow: install  ## run the slow tier of the tests
-	$(BIN)/python -m pytest -n auto --dist load -m slow
+	$(BIN)/python -m pytest -n auto --dist loadfile -m slow
 
 check: install  ## ruff, mypy and the import rules
 	$(BIN)/ruff check .

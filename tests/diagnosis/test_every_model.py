@@ -121,10 +121,13 @@ def test_accidents_with_a_wet_road_are_diagnosed(
     found = search(problem, causes)
     assert found.cause == "wet_road"
     # Signals it has none; a further scalar it has.
-    seen = emulator.widened({}, ["head_impact_time"])(problem.tests[0].inputs, {})
+    seen = emulator.widened({}, ["log_head_impact_time"])(problem.tests[0].inputs, {})
     assert seen is not None
     assert not seen.signals
-    assert set(seen.scalars) == {*(s.name for s in problem.tests[0].scalars), "head_impact_time"}
+    assert set(seen.scalars) == {
+        *(s.name for s in problem.tests[0].scalars),
+        "log_head_impact_time",
+    }
 
 
 def test_the_motion_before_the_heads_impact_is_no_noise(tmp_path: Path) -> None:

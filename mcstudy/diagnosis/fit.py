@@ -5,7 +5,7 @@ every test's own nuisances; the Jacobian is block-arrow, so tests are eliminated
 evidence is Laplace's approximation.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -227,11 +227,29 @@ def misfit_of(
     weight : float
         Weight of the data against the priors.
     """
+    residuals = (
+        layout.residual(observation, own, scatter)
+        for layout, observation, own in zip(layouts, seen, scores.own, strict=True)
+    )
+    return half_squares(residuals, scores, weight) + weight**2 * log_widening(layouts, seen)
+
+
+def half_squares(residuals: Iterable[Array], scores: Scores, weight: float) -> float:
+    """Return half the sum of squares of residuals and latents.
+
+    Parameters
+    ----------
+    residuals : iterable of (n,) array
+        Whitened, one a test.
+    scores : Scores
+        Latents.
+    weight : float
+        Weight of the data against the priors.
+    """
     total = float(scores.shared @ scores.shared)
-    for layout, observation, own in zip(layouts, seen, scores.own, strict=True):
-        residual = layout.residual(observation, own, scatter)
+    for residual, own in zip(residuals, scores.own, strict=True):
         total += weight**2 * float(residual @ residual) + float(own @ own)
-    return 0.5 * total + weight**2 * log_widening(layouts, seen)
+    return 0.5 * total
 
 
 def _sizes(slopes: Slopes | None) -> Array | None:

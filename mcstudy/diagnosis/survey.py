@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from mcstudy.diagnosis.fit import Fit, FitError, fit, log_widening, misfit_of
+from mcstudy.diagnosis.fit import Fit, FitError, fit, half_squares, log_widening, misfit_of
 from mcstudy.diagnosis.jacobian import Slopes, observe_tests
 from mcstudy.diagnosis.layout import Layout, Scatter
 from mcstudy.diagnosis.linear_model import Centre, solve
@@ -193,7 +193,7 @@ def survey(
             # One start a value of the first parameter, where or when the cause sets in.
             place = float(scores[0]) if scores.size else 0.0
             if place not in tried or cost < tried[place].cost:
-                at_rest = misfit_of(places, seen, start, scatter, weight)
+                at_rest = half_squares(residuals, start, weight) + wider
                 tried[place] = _Trial(cost, moved, still, whole.slopes, at_rest)
         ranked = sorted(tried.values(), key=lambda entry: entry.cost)
         best += ranked[:1]

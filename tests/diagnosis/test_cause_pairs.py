@@ -3,7 +3,6 @@
 Candidates are made by hand: which of them compete is the rule under test, not their fits.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
@@ -44,8 +43,7 @@ def answer(
 
     monkeypatch.setattr(cause_pairs, "rank_causes", rank)
     monkeypatch.setattr(cause_pairs, "examine", examine)
-    causes: Sequence[object] = ()
-    found, _ = best_pair(problem, causes, layouts, candidates, STRUCTURE, 1, None)  # type: ignore[arg-type]
+    found, _ = best_pair(problem, (), layouts, candidates, STRUCTURE, 1, None)
     return (found[0].first.cause.name, found[0].second) if found else None
 
 

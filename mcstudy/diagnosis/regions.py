@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mcstudy.diagnosis.fit import Fit
 from mcstudy.diagnosis.layout import Layout
 from mcstudy.diagnosis.marginal import Marginal
-from mcstudy.diagnosis.templates import regimes_of
+from mcstudy.diagnosis.regimes import regimes_of
 
 Array = NDArray[np.float64]
 

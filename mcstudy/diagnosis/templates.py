@@ -12,6 +12,7 @@ from mcstudy.diagnosis.jacobian import observe_tests
 from mcstudy.diagnosis.layout import Layout
 from mcstudy.diagnosis.normal_equations import Scores
 from mcstudy.diagnosis.problem import Cause, Form, Problem
+from mcstudy.diagnosis.regimes import covariates_of, separate_factors
 from mcstudy.execution.workers import run_jobs
 
 Array = NDArray[np.float64]
@@ -170,26 +171,6 @@ def change_of(
     )
 
 
-def covariates_of(layouts: Sequence[Layout]) -> dict[str, Array]:
-    """Return the covariates of slow changes, centred and scaled to unit standard deviation."""
-    found = {}
-    for name in layouts[0].test.covariates:
-        values = np.array([layout.test.covariates[name] for layout in layouts])
-        if np.all(np.isfinite(values)) and values.std() > 0.0:
-            found[name] = (values - values.mean()) / values.std()
-    return found
-
-
-def regimes_of(layouts: Sequence[Layout]) -> dict[str, Array]:
-    """Return the recorded inputs that differ from test to test, centred and scaled."""
-    found = {}
-    for name in layouts[0].test.inputs:
-        values = np.array([layout.test.inputs[name] for layout in layouts])
-        if values.std() > 1e-9 * abs(values.mean()):
-            found[name] = (values - values.mean()) / values.std()
-    return found
-
-
 def drifts(layouts: Sequence[Layout], fitted: Fit, shared: Sequence[str]) -> Shapes:
     """Return every nuisance and every shared value drifting along every covariate.
 
@@ -225,11 +206,10 @@ def drifts(layouts: Sequence[Layout], fitted: Fit, shared: Sequence[str]) -> Sha
 
 
 def smooth_discrepancy(layouts: Sequence[Layout], fitted: Fit) -> Shapes:
-    """Return products of pulse and cosines: alone, times regimes, times covariates."""
+    """Return products of pulse and cosines: alone, and times what differs from test to test."""
     factors: Mapping[str, Array] = {
         ALL_TESTS: np.ones(len(layouts)),
-        **regimes_of(layouts),
-        **covariates_of(layouts),
+        **separate_factors(layouts),
     }
     return _discrepancy(layouts, fitted, range(SMOOTH), factors, shaped=True)
 

@@ -24,11 +24,11 @@ SECOND = 6.0
 SECONDS = 12
 """Forms that are refitted as a second cause."""
 FAINT_SHARE = 0.003
-"""Share of the first cause's log evidence that a second one must add where the residuals of the
-first pass the general test: even the best form of a large effect leaves a small residual."""
+"""Share of the first cause's log evidence that a second one must add: even the best form of a large
+effect leaves a small residual."""
 ENOUGH = 0.8
 """Share of what a free discrepancy would explain beside the first cause that a second one must add
-where they do not."""
+where the residuals of the first do not pass the general test."""
 NOTABLE = 0.1
 """The same where the residuals of both causes have structure."""
 NEARLY_ALL = 0.99
@@ -43,8 +43,8 @@ PAIRS = 2
 
 def _needed(sole: float, alone: Remainder) -> float:
     """Return the log evidence that a second cause must add beside a first one of evidence sole."""
-    small = FAINT_SHARE * sole if alone.p_value >= STRUCTURE else ENOUGH * alone.left
-    return max(SECOND, small)
+    rest = 0.0 if alone.p_value >= STRUCTURE else ENOUGH * alone.left
+    return max(SECOND, FAINT_SHARE * sole, rest)
 
 
 @dataclass(frozen=True)

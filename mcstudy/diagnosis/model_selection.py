@@ -219,7 +219,8 @@ def indistinguishable(candidates: Sequence[Candidate], left: float = 0.0) -> tup
     """Return the causes indistinguishable from the best one, with it; none if it is unique.
 
     Where the best one leaves structure, so may the difference of two causes be due to their forms:
-    what a free discrepancy would still explain counts as the uncertainty of the evidence.
+    what a free discrepancy would still explain counts as the uncertainty of the evidence. Causes
+    that explain nothing are left out all the same.
 
     Parameters
     ----------
@@ -229,7 +230,7 @@ def indistinguishable(candidates: Sequence[Candidate], left: float = 0.0) -> tup
         Log units that a free discrepancy would still explain beside the best one.
     """
     apart = max(DISTINCT, WIDENING * left)
-    limit = candidates[0].log_evidence - apart
+    limit = max(candidates[0].log_evidence - apart, 0.0)
     near = tuple(c.cause.name for c in candidates if c.log_evidence > limit)
     return near if len(near) > 1 else ()
 

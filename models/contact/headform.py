@@ -42,6 +42,10 @@ class HeadformContact:
     part_mass, part_stiffness, part_damping : float
         A part of the hood that the headform strikes through a local spring and damper, kg, N/m and
         N s/m; without mass for none.
+    guide_force : float
+        Force of a guide of the rig against the headform's motion at 8 m/s, N.
+    guide_exponent : float
+        Exponent of the speed in that force.
     """
 
     friction: float
@@ -56,3 +60,5 @@ class HeadformContact:
     part_mass: float = 0.0
     part_stiffness: float = 0.0
     part_damping: float = 0.0
+    guide_force: float = 0.0
+    guide_exponent: float = 0.0

@@ -20,6 +20,8 @@ EFFECTS: tuple[str, ...] = (
     "rate_dependent_hood",
     "hood_inertia",
     "skin_compliance",
+    # The rig that guides the headform.
+    "guide_friction",
     # The car, the pedestrian and the road of a crash.
     "late_braking",
     "brake_dive",

@@ -38,13 +38,21 @@ class Impactor(NamedTuple):
         About a transverse axis, kg m2.
     radius : float
         m.
+    guide_force : float
+        Force of a guide of the rig against its motion at the reference rate, N.
+    guide_exponent : float
+        Exponent of the speed in that force, 0 for dry friction.
     """
 
     mass: float
     inertia: float
     radius: float
+    guide_force: float = 0.0
+    guide_exponent: float = 0.0
 
 
+GUIDE_SLIP = 0.02
+"""Speed (m/s) below which the friction of a guide fades, so that it has no jump (assumed)."""
 REFERENCE_RATE = 8.0
 """Rate (m/s) at which a rate's share of the force is given: that of a headform test."""
 REFERENCE_DEPTH = 0.03
@@ -150,9 +158,39 @@ def hood_force(surface, laws, count, depth, rate, deepest):
     return elastic + viscous
 
 
+@inlined_kernel
+def _guide_drag(impactor, rate):
+    """Return the force (N) of the guide against the way into the hood at a rate (m/s)."""
+    if impactor.guide_force == 0.0:
+        return 0.0
+    speed = abs(rate)
+    size = impactor.guide_force * min(1.0, speed / GUIDE_SLIP)
+    if impactor.guide_exponent != 0.0 and speed > 0.0:
+        size *= (speed / REFERENCE_RATE) ** impactor.guide_exponent
+    return size if rate > 0.0 else -size
+
+
+@kernel
+def write_guide_drag(impactor, rates, drag):
+    """Write the force of the guide against the way into the hood.
+
+    Parameters
+    ----------
+    impactor : Impactor
+    rates : (n,) array
+        Speeds into the hood, m/s.
+    drag : (n,) array
+        Filled, N.
+    """
+    for k in range(rates.size):
+        drag[k] = _guide_drag(impactor, rates[k])
+
+
 @kernel
 def strike(impactor, surface, laws, count, rate, slide, step, stride, record, summary):
     """Step from first contact until the headform leaves the surface.
+
+    The energy that is absorbed includes that of a guide.
 
     Parameters
     ----------
@@ -176,14 +214,14 @@ def strike(impactor, surface, laws, count, rate, slide, step, stride, record, su
     """
     mass, radius = impactor.mass, impactor.radius
     depth, deepest, spin, absorbed = 0.0, 0.0, 0.0, 0.0
-    force, drag, power = 0.0, 0.0, 0.0
+    force, drag, power, guide = 0.0, 0.0, 0.0, 0.0
     moved, last_growth, last_deepest = 0.0, 0.0, 0.0
     samples = 0
     summary[END_TIME] = math.nan
     steps = record.shape[0] * stride
     for k in range(steps + 1):
         if k > 0:
-            old_force, old_drag, old_power = force, drag, power
+            old_force, old_drag, old_power = force + guide, drag, power
             depth += step * rate - 0.5 * step * step * old_force / mass
             old_rate, old_slide, old_spin = rate, slide, spin
             rate -= step * old_force / mass
@@ -191,6 +229,7 @@ def strike(impactor, surface, laws, count, rate, slide, step, stride, record, su
             spin += step * old_drag * radius / impactor.inertia
         deepest = max(deepest, depth)
         force = hood_force(surface, laws, count, depth, rate, deepest)
+        guide = _guide_drag(impactor, rate)
         if surface.pickup.shape[0] > 1:
             # Mass of the hood reaches the headform's speed when it is picked up, and keeps it.
             if rate > 0.0 and depth >= deepest:
@@ -198,15 +237,17 @@ def strike(impactor, surface, laws, count, rate, slide, step, stride, record, su
                 moved += 0.5 * (last_growth + growth) * (depth - last_deepest)
                 last_growth, last_deepest = growth, depth
                 force += growth * rate * rate
-            force *= mass / (mass + moved)
+            if force > 0.0:
+                # The guide slows the mass that moves along, too.
+                force = mass / (mass + moved) * (force + guide) - guide
         slip = slide - radius * spin
         drag = friction_coefficient(surface.friction, force, slip * slip, mass) * slip
         if k > 0:
             half = 0.5 * step
-            rate = old_rate - half * (old_force + force) / mass
+            rate = old_rate - half * (old_force + force + guide) / mass
             slide = old_slide - half * (old_drag + drag) / mass
             spin = old_spin + half * (old_drag + drag) * radius / impactor.inertia
-        power = force * rate + drag * (slide - radius * spin)
+        power = (force + guide) * rate + drag * (slide - radius * spin)
         if k > 0:
             absorbed += 0.5 * step * (old_power + power)
         if k % stride == 0 and samples < record.shape[0]:
@@ -299,7 +340,8 @@ def strike_part(
             record[samples, SLIDE] = slide
             record[samples, SPIN] = spin
             samples += 1
-        absorbed += step * (press * rate + drag * slip)
+        guide = _guide_drag(impactor, rate)
+        absorbed += step * ((press + guide) * rate + drag * slip)
         if press > 0.0:
             free, ended = 0.0, k * step
         else:
@@ -307,7 +349,7 @@ def strike_part(
         if free > least:
             summary[END_TIME] = ended
             break
-        rate -= step * press / mass
+        rate -= step * (press + guide) / mass
         slide -= step * drag / mass
         spin += step * drag * radius / impactor.inertia
         hood_rate += step * (press - below) / part.mass

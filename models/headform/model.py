@@ -18,7 +18,7 @@ from models.headform.facet_target import FacetTarget
 from models.headform.fem_target import FemTarget
 from models.headform.impact import END_TIME, Impactor
 from models.headform.outcome import Test
-from models.headform.target import SAMPLING_RATE, Target, vinyl_skin
+from models.headform.target import SAMPLING_RATE, Strike, Target, vinyl_skin
 from models.headform.zone_target import ZoneTarget
 from models.protocol import (
     OK,
@@ -241,15 +241,19 @@ class HeadformModel:
         return Test(
             impactor=impactor,
             strike=struck,
-            reading=self._reading(struck.force, mass, values),
+            reading=self._reading(struck, mass, values),
             quiet=outcome.quiet_samples(self.channel_class),
         )
 
-    def _reading(self, force: Array, mass: float, values: Mapping[str, float]) -> Record:
+    def _reading(self, struck: Strike, mass: float, values: Mapping[str, float]) -> Record:
         """Return the recorded components of the acceleration, with free flight around them."""
+        force = struck.force
         quiet = outcome.quiet_samples(self.channel_class)
         padded = np.zeros((len(force) + 2 * quiet, force.shape[1]))
-        padded[quiet : quiet + len(force)] = force / (mass * STANDARD_GRAVITY)
+        padded[quiet : quiet + len(force)] = force
+        if struck.guide is not None:
+            padded[:, 0] += np.pad(struck.guide, quiet - 1, mode="edge")
+        padded /= mass * STANDARD_GRAVITY
         felt = Reading(padded, self.channel_class)
         return record_reading(self._chain, values, felt, SAMPLING_RATE, origin=quiet)
 

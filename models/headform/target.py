@@ -50,6 +50,9 @@ class Strike:
         Largest and permanent penetration of the surface, m.
     doubtful : bool
         Whether the mesh was too coarse for what happened.
+    guide : (samples + 2,) array, optional
+        Force of the rig's guide on the headform along the normal, against the way in, before
+        contact, at each sample and after it, N; by default the headform flies freely.
     """
 
     speeds: tuple[float, float]
@@ -58,6 +61,7 @@ class Strike:
     force: Array
     dent: tuple[float, float]
     doubtful: bool = False
+    guide: Array | None = None
 
 
 class Target(Protocol):

@@ -27,6 +27,7 @@ from models.headform.impact import (
     COLUMNS,
     DEEPEST,
     NORMAL,
+    RATE,
     SAMPLES,
     SUMMARY,
     TANGENTIAL,
@@ -35,6 +36,7 @@ from models.headform.impact import (
     Surface,
     strike,
     strike_part,
+    write_guide_drag,
 )
 from models.headform.target import (
     LONGEST_CONTACT,
@@ -60,7 +62,10 @@ MOTION = frozenset({"impact_speed", "impact_angle"})
 
 
 class _Hood(NamedTuple):
-    """What is struck: its law, number of knots, steps per sample, contact, and part with mass."""
+    """What is struck: its law, number of knots, steps per sample, contact, and part with mass.
+
+    With the force of the rig's guide and the exponent of the speed in it.
+    """
 
     laws: Array
     knots: int
@@ -68,6 +73,7 @@ class _Hood(NamedTuple):
     surface: Surface
     part: Part | None
     unloading_ratio: float
+    guide: tuple[float, float]
 
 
 class ZoneTarget:
@@ -174,6 +180,7 @@ class ZoneTarget:
         stride = hood.stride
         speed, angle = values["impact_speed"], values["impact_angle"]
         speeds = (speed * math.cos(angle), speed * math.sin(angle))
+        impactor = impactor._replace(guide_force=hood.guide[0], guide_exponent=hood.guide[1])
         record = np.empty((round(LONGEST_CONTACT * SAMPLING_RATE), COLUMNS))
         summary = np.zeros(SUMMARY)
         if hood.part is not None:
@@ -194,6 +201,7 @@ class ZoneTarget:
             summary=summary,
             force=kept[:, NORMAL : TANGENTIAL + 1],
             dent=(dent, dent * (1.0 - 1.0 / hood.unloading_ratio)),
+            guide=_guide_forces(impactor, kept[:, RATE], speeds[0]),
         )
 
     def _hood(self, values: Mapping[str, float], chain: EffectChain, mass: float) -> _Hood:
@@ -225,9 +233,19 @@ class ZoneTarget:
             contact.rate_exponent, contact.rate_force, contact.pickup,
             curve.unloading_growth, curve.unloading_curvature,
         )  # fmt: skip
-        built = _Hood(laws, count, stride, surface, part, curve.unloading_ratio)
+        guide = (contact.guide_force, contact.guide_exponent)
+        built = _Hood(laws, count, stride, surface, part, curve.unloading_ratio, guide)
         self._hoods.put(key, built)
         return built
+
+
+def _guide_forces(impactor: Impactor, rates: Array, speed: float) -> Array | None:
+    """Return the force of the guide before contact, at each sample of it, and after it."""
+    if impactor.guide_force == 0.0:
+        return None
+    forces = np.empty(rates.size + 2)
+    write_guide_drag(impactor, np.concatenate([[speed], rates, rates[-1:]]), forces)
+    return forces
 
 
 def _curve_of(knots: Sequence[Sequence[float]]) -> ForceCurve:

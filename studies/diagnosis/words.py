@@ -22,6 +22,7 @@ SENTENCES = {
     "hood_inertia": "The hood's own mass, {mass}, is set in motion.",
     "unloading_slope": "The hood's unloading slope is {factor} times the assumed one.",
     "skin_compliance": "The headform's skin has a compliance of {compliance}.",
+    "guide_friction": "The guide of the drop rig rubs with {force}.",
     "hood_force_scale": "The forces are {factor} times those of the hood's curve.",
     "sensor_gain": "The accelerometer reads {factor} times the true acceleration.",
     "sensor_offset": "The accelerometer has a zero offset of {offset}.",

@@ -56,6 +56,8 @@ def test_generator_and_model_agree_where_nothing_is_hidden(tmp_path: Path) -> No
         ("skin_compliance", "catalogue", {"compliance": 1e-6}, {"compliance": 1e-6, "power": 1.0}),
         ("skin_compliance", "hertz", {"compliance": 1e-6},
          {"compliance": 1e-6, "power": 2.0 / 3.0}),
+        ("guide_friction", "catalogue", {"force": 60.0}, {"force": 60.0, "exponent": 0.0}),
+        ("guide_friction", "greased", {"force": 60.0}, {"force": 60.0, "exponent": 1.0}),
         ("unloading_slope", "curved", {"curvature": 1.8}, {"factor": 1.0, "curvature": 1.8}),
         ("unloading_slope", "deep", {"growth": 0.6}, {"factor": 1.0, "growth": 0.6}),
     ],
@@ -80,7 +82,7 @@ def test_a_guide_that_rubs_slows_the_headform_both_ways_and_leaves_the_load_cell
     tmp_path: Path,
 ) -> None:
     lab = replace(QUIET, force=True, force_sd=0.0)
-    rubbing = Hidden("guide_friction", "", {"force": 100.0})
+    rubbing = Hidden("guide_friction", "catalogue", {"force": 100.0})
     make_tests(tmp_path / "m", [rubbing], 1, lab, header_of=Laboratory(force=True))
     data = load_measured(tmp_path / "m")
     test = data.tests["test"].iloc[0]

@@ -63,6 +63,10 @@ CATALOGUE: dict[str, list[Draw]] = {
         _one("skin_compliance", "catalogue", compliance=(2e-8, 8e-7)),
     ],
     "unloading_slope": [_factor("unloading_slope", 0.02, 0.4)],
+    "guide_friction": [
+        _one("guide_friction", "catalogue", force=(4.0, 80.0)),
+        _one("guide_friction", "greased", force=(4.0, 80.0)),
+    ],
     "hood_force_scale": [_factor("hood_force_scale", 0.1, 0.4)],
     "sensor_gain": [_factor("sensor_gain", 0.006, 0.15)],
     "sensor_offset": [_one("sensor_offset", "catalogue", "offset", offset=(0.3, 6.0))],
@@ -99,6 +103,7 @@ FOREIGN: dict[str, list[Draw]] = {
         _one("unloading_slope", "curved", curvature=(1.2, 2.5)),
         _one("unloading_slope", "deep", "growth", growth=(0.15, 0.8)),
     ],
+    "guide_friction": [_one("guide_friction", "stribeck", force=(4.0, 80.0))],
     "hood_force_scale": [_one("hood_force_scale", "ageing", loss=(0.02, 0.25))],
     "sensor_gain": [_one("sensor_gain", "warming", "change", change=(0.01, 0.12))],
     "sensor_offset": [_one("sensor_offset", "drifting", "offset", offset=(0.8, 8.0))],
@@ -121,7 +126,7 @@ OUTSIDE: list[Draw] = [
     _one("ringing", "", share=(0.02, 0.12), length=(0.008, 0.02)),
     _one("cable", "", size=(0.6, 4.0)),
     _one("rupture", "", depth=(0.015, 0.03), share=(0.05, 0.3)),
-    _one("guide_friction", "", force=(5.0, 80.0)),
+    _one("turning", "", rate=(8.0, 40.0)),
     _one("mount_resonance", "", frequency=(500.0, 900.0), damping_ratio=(0.05, 0.15)),
 ]
 CRASHES: dict[str, list[Draw]] = {

@@ -51,7 +51,10 @@ def make_tests(
     speeds = np.sort(rng.uniform(lab.slowest, lab.fastest, lab.tests))
     if lab.repeats:
         speeds[rng.permutation(lab.tests)[: lab.repeats]] = 0.5 * (lab.slowest + lab.fastest)
-    rng.shuffle(speeds)
+    if lab.rising:
+        speeds.sort()
+    else:
+        rng.shuffle(speeds)
     rows = []
     (folder / "signals").mkdir(parents=True)
     for k, speed in enumerate(speeds):

@@ -33,20 +33,14 @@ class Impact:
     mass : of the headform, kg.
     end : of the contact, s.
     rebound : speed, m/s.
-    drag : of the guide on the headform, against its motion, N.
-    turn : when the headform turns, s.
+    guide : force of the guide against the way into the hood, N.
     """
 
     force: Callable[[Array], Array]
     mass: float
     end: float
     rebound: float
-    drag: float = 0.0
-    turn: float = 0.0
-
-    def guide(self, time: Array) -> Array:
-        """Return the force of the guide against the way into the hood (N), (n,)."""
-        return np.where(time < self.turn, self.drag, -self.drag)
+    guide: Callable[[Array], Array] = np.zeros_like
 
 
 def find(hidden: Sequence[Hidden], name: str) -> Hidden | None:
@@ -78,10 +72,22 @@ def strike(
     inertia = find(hidden, "hood_inertia")
     if inertia is not None and inertia.form == "local_spring":
         return _strike_sprung(law, _unloading(hidden, lab), mass, speed, inertia.numbers)
-    # Outside the catalogue: the headform still rubs on its guide, in either direction.
-    guide = find(hidden, "guide_friction")
-    drag = 0.0 if guide is None else guide.numbers["force"]
-    return _strike(law, _unloading(hidden, lab), mass, speed, inertia, drag)
+    return _strike(
+        law, _unloading(hidden, lab), mass, speed, inertia, find(hidden, "guide_friction")
+    )
+
+
+def _guide(h: Hidden | None, rate: float) -> float:
+    """Return the force (N) of the guide against the way into the hood at a rate (m/s)."""
+    if h is None:
+        return 0.0
+    size = h.numbers["force"]
+    if h.form == "greased":
+        size *= abs(rate) / 8.0
+    elif h.form == "stribeck":
+        # Grease carries more and more of the load as the headform gets faster.
+        size *= 0.3 + float(np.exp(-abs(rate) / 3.0))
+    return float(size * np.sign(rate))
 
 
 def _loading(hidden: Sequence[Hidden], lab: Laboratory, scale: float, order: int) -> Law:
@@ -240,7 +246,7 @@ def _strike(
     mass: float,
     speed: float,
     inertia: Hidden | None,
-    drag: float,
+    guide: Hidden | None,
 ) -> Impact:
     options: Any = {"rtol": 1e-9, "atol": 1e-10, "max_step": 1e-4, "dense_output": True}
 
@@ -256,6 +262,7 @@ def _strike(
 
     def slowing(depth: float, rate: float) -> float:
         carried, growth = moved(depth)
+        drag = _guide(guide, rate)
         return (law(depth, rate) + drag + growth * rate * rate) / (mass + carried)
 
     def into(_t: float, y: Array) -> list[float]:
@@ -268,8 +275,13 @@ def _strike(
     # The mass that was picked up moves out with the headform.
     heavy = mass + moved(deepest)[0]
 
+    def rebounding(depth: float, rate: float) -> float:
+        # At the turn the headform is already on its way out.
+        drag = _guide(guide, min(rate, -1e-9))
+        return (unloading.force(top, deepest, depth) + drag) / heavy
+
     def out(_t: float, y: Array) -> list[float]:
-        return [y[1], (drag - unloading.force(top, deepest, y[0])) / heavy]
+        return [y[1], -rebounding(y[0], y[1])]
 
     parting = deepest - top / unloading.slope(top, deepest)
     parted = _Event(lambda y: float(y[0] - parting))
@@ -285,13 +297,20 @@ def _strike(
         for k, t in enumerate(time):
             if 0.0 <= t <= turn:
                 depth, rate = map(float, into_hood(float(t)))
-                found[k] = mass * slowing(depth, rate) - drag
+                found[k] = mass * slowing(depth, rate) - _guide(guide, rate)
             elif turn < t <= end:
-                depth = float(out_of_hood(float(t))[0])
-                found[k] = mass * unloading.force(top, deepest, depth) / heavy
+                depth, rate = map(float, out_of_hood(float(t)))
+                found[k] = mass * rebounding(depth, rate) - _guide(guide, min(rate, -1e-9))
         return found
 
-    return Impact(force, mass, end, rebound, drag, turn)
+    def drag(time: Array) -> Array:
+        rates = np.where(time < 0.0, speed, -rebound)
+        for k, t in enumerate(time):
+            if 0.0 <= t <= end:
+                rates[k] = (into_hood if t <= turn else out_of_hood)(float(t))[1]
+        return np.array([_guide(guide, float(rate)) for rate in rates])
+
+    return Impact(force, mass, end, rebound, np.zeros_like if guide is None else drag)
 
 
 def _strike_sprung(

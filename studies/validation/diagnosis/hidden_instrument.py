@@ -104,6 +104,12 @@ def _resonance(h: Hidden, acceleration: Array, time: Array, _progress: float) ->
     return np.asarray(signal.lsim(system, acceleration, time - time[0])[1])
 
 
+def _turning(h: Hidden, acceleration: Array, time: Array, _progress: float) -> Array:
+    # Outside the catalogue: the headform turns, and its sensor looks aside.
+    turned = np.minimum(h.numbers["rate"] * np.maximum(time, 0.0), 0.5 * np.pi)
+    return np.asarray(acceleration * np.cos(turned))
+
+
 Change = Callable[[Hidden, Array, Array, float], Array]
 READINGS: dict[str, Change] = {
     "sensor_gain": _gain,
@@ -111,6 +117,7 @@ READINGS: dict[str, Change] = {
     "sensor_saturation": _saturation,
     "cable": _cable,
     "mount_resonance": _resonance,
+    "turning": _turning,
 }
 
 

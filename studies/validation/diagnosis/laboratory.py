@@ -65,6 +65,8 @@ class Laboratory:
         Of the logarithm of the hood's unknown force scale.
     force, rebound : bool
         Whether a load cell and a rebound speed were recorded.
+    rising : bool
+        Whether the speed rises from test to test.
     """
 
     tests: int = 18
@@ -83,6 +85,7 @@ class Laboratory:
     scale_sd: float = 0.06
     force: bool = False
     rebound: bool = False
+    rising: bool = False
 
 
 def draw_laboratory(rng: np.random.Generator, *, force: bool) -> Laboratory:
@@ -111,4 +114,5 @@ def draw_laboratory(rng: np.random.Generator, *, force: bool) -> Laboratory:
         scale_sd=float(rng.uniform(0.04, 0.15)),
         force=force,
         rebound=force,
+        rising=bool(rng.random() < 0.25),
     )

@@ -36,7 +36,7 @@ SHARES = {
 """Sets of each kind, with load cell and rebound speed or not, of the usual laboratory or another:
 half of the sets have forms or effects that the catalogue does not have."""
 SETS = 300
-SEED = 32_000
+SEED = 40_000
 """Seed of the first trial of a kind."""
 VISIBLE, LARGE = 1.0, 10.0
 """Sizes over the minimum detectable one from which an effect counts as visible and as large."""

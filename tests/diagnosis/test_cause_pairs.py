@@ -64,3 +64,13 @@ def test_two_causes_must_beat_the_best_single_one(monkeypatch: pytest.MonkeyPatc
     singles = {"alone": 500.0, "first": 400.0}
     assert answer(monkeypatch, singles, {"first": {"second": 102.0}}) is None
     assert answer(monkeypatch, singles, {"first": {"second": 140.0}}) == ("first", "second")
+
+
+def test_a_second_cause_adds_its_share_of_a_large_first_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A saturation of 33,000 log units, whose rest an unloading slope took by 13 of them."""
+    singles = {"saturation": 32_990.0}
+    assert answer(monkeypatch, singles, {"saturation": {"unloading": 13.0}}) is None
+    found = answer(monkeypatch, singles, {"saturation": {"unloading": 200.0}})
+    assert found == ("saturation", "unloading")

@@ -183,7 +183,7 @@ def test_no_cause_no_alarm_and_a_cause_is_named() -> None:
 
 @pytest.mark.slow
 def test_p_values_of_data_that_the_model_makes_are_uniform() -> None:
-    p = np.array([search(make_problem(100 + k), []).screening.p_value for k in range(16)])
+    p = np.array([search(make_problem(100 + k), []).screening.p_value for k in range(40)])
     assert stats.kstest(p, "uniform").pvalue > 0.01
     assert np.mean(p <= 0.05) <= 0.15
 

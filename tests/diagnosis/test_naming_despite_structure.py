@@ -10,7 +10,7 @@ import pytest
 from linear_tests import BUMP, SIZE, make_problem
 
 from mcstudy.diagnosis.base_model import fit_base
-from mcstudy.diagnosis.model_selection import Candidate
+from mcstudy.diagnosis.model_selection import Candidate, indistinguishable
 from mcstudy.diagnosis.problem import Form
 
 FORMULA = BUMP.forms[0]
@@ -64,3 +64,15 @@ def test_a_formula_may_leave_more(found: tuple[float, float]) -> None:
 
 def test_a_cause_that_explains_half_is_not_named() -> None:
     assert not names(FORMULA, 100.0, 100.0)
+
+
+def test_causes_that_explain_nothing_are_not_listed_beside_one_that_leaves_structure() -> None:
+    """A guide that rubs on the headform: a rest of 13 log units would list eleven causes."""
+    _, fitted = fit_base(make_problem(1, tests=3))
+    evidence = {"guide": 18.6, "inertia": 2.0, "mass": -0.2, "scale": -0.3}
+    found = [
+        Candidate(replace(BUMP, name=name), fitted, FORMULA, value, {})
+        for name, value in evidence.items()
+    ]
+    assert indistinguishable(found, 12.6) == ("guide", "inertia")
+    assert indistinguishable(found[:1] + found[2:], 12.6) == ()

@@ -211,6 +211,51 @@ def test_a_yielding_a_resilient_and_a_padded_hood() -> None:
     assert abs(soft["energy_residual"]) < 1e-3
 
 
+@pytest.mark.parametrize("exponent", [0.0, 1.0])
+@pytest.mark.parametrize("speed", [4.0, 10.0])
+def test_a_guide_is_felt_before_and_after_contact_and_takes_energy(
+    exponent: float, speed: float
+) -> None:
+    # Force over mass, against the motion; the hood's force channel feels nothing of it.
+    usual = struck(impact_speed=speed)
+    rubbing = {"guide_friction": {"force": 50.0, "exponent": exponent}}
+    run = struck(rubbing, impact_speed=speed)
+    head, hood = run.histories["head"], run.histories["hood"].channels["force"]
+    mass = run.inputs["headform_mass"]
+    after = run.outputs["rebound_speed"]
+
+    def felt(rate: float) -> float:
+        return 50.0 * (rate / 8.0) ** exponent / mass / 9.80665
+
+    acceleration = head.channels["acceleration_normal"]
+    assert acceleration[head.time < -0.003] == pytest.approx(felt(speed), rel=1e-3)
+    assert acceleration[-20:] == pytest.approx(-felt(after), rel=1e-3)
+    assert not np.any(hood[head.time < 0.0])
+    assert after < usual.outputs["rebound_speed"]
+    assert abs(run.outputs["energy_residual"]) < 1e-3
+
+
+def test_a_guide_and_a_hood_with_mass_keep_the_balance_of_momentum() -> None:
+    """The reading times the mass is the hood's force and the guide's: a hood that moves along."""
+    for inertia in ({"mass": 0.3, "depth": 0.008}, {"mass": 0.3, "stiffness": 3e6,
+                                                    "damping_ratio": 0.1}):  # fmt: skip
+        run = struck(
+            {"hood_inertia": inertia, "guide_friction": {"force": 80.0}}, channel_class=0.0
+        )
+        head, hood = run.histories["head"], run.histories["hood"].channels["force"]
+        time, speed = head.time, head.channels["velocity_normal"]
+        mass = run.inputs["headform_mass"]
+        pressed = hood > 0.0
+        impulse = np.trapezoid(mass * 9.80665 * head.channels["acceleration_normal"], time)
+        # The guide's impulses of as much time before the contact as after it cancel.
+        assert impulse == pytest.approx(mass * (speed[0] - speed[-1]), rel=0.01)
+        felt = mass * 9.80665 * head.channels["acceleration_normal"] - hood
+        inward = pressed & (speed > 0.1)
+        outward = pressed & (speed < -0.1)
+        np.testing.assert_allclose(felt[inward], 80.0, rtol=1e-6)
+        np.testing.assert_allclose(felt[outward], -80.0, rtol=1e-6)
+
+
 @pytest.mark.parametrize("exponent", [0.3, 1.0])
 def test_the_rate_raises_the_force_by_its_share(exponent: float) -> None:
     # At equal penetration early in the pulse, where the rate is nearly that of the impact.

@@ -14,6 +14,8 @@ from mcstudy.typed_json import from_plain
 SHOWN_UNITS = {"m": ("mm", 1e3), "rad": ("deg", 57.29577951308232), "m/N": ("mm/kN", 1e6),
                "N/m": ("kN/m", 1e-3), "N": ("kN", 1e-3)}  # fmt: skip
 """Display units of parameters, and their factors."""
+SMALL = 100.0
+"""N below which a force is shown in N."""
 
 SENTENCES = {
     "hood_bottoming": "The hood hits a structure {clearance} below it.",
@@ -46,7 +48,7 @@ SENTENCES = {
 
 def _shown_unit(name: str, value: float) -> tuple[str, float]:
     """Return the display unit of a value, and its factor."""
-    if name == "m" and abs(value) >= 1.0:
+    if (name == "m" and abs(value) >= 1.0) or (name == "N" and abs(value) < SMALL):
         return name, 1.0
     return SHOWN_UNITS.get(name, (name, 1.0))
 

@@ -254,3 +254,11 @@ def test_data_and_results_may_not_share_a_folder(plain: Path) -> None:
 def test_a_parameter_is_as_exact_as_its_half_width(value: float, half: float, text: str) -> None:
     row = {"unit": "m", "value": value, "low": value - half, "high": value + half}
     assert words.shown(row) == text
+
+
+@pytest.mark.parametrize(("value", "text"), [(14.0, "14.0 ± 1.4 N"), (1400.0, "1.40 ± 0.14 kN")])
+def test_the_friction_of_a_guide_is_shown_in_newtons_the_force_of_a_hood_in_kilonewtons(
+    value: float, text: str
+) -> None:
+    row = {"unit": "N", "value": value, "low": 0.9 * value, "high": 1.1 * value}
+    assert words.shown(row) == text

@@ -86,6 +86,9 @@ class Corridor:
 
 MOST_GIVEN = 16
 """Largest number of knots of a curve that is read; effects add others to it."""
+STEEPEST = 1e12
+"""Largest slope (N/m) of a curve that is read: steel of a cross-section of 1 m2 and a length of
+0.2 m (assumed); a slip of the decimal point is steeper."""
 
 
 def read_curve(knots: Any, unloading_ratio: float, damping: float = 0.0) -> ForceCurve:
@@ -103,14 +106,21 @@ def read_curve(knots: Any, unloading_ratio: float, damping: float = 0.0) -> Forc
     Raises
     ------
     ValueError
-        If these are no pairs, or no loading curve.
+        If these are no pairs, no loading curve, or one that is steeper than any structure.
     """
     table = np.array(knots, dtype=np.float64)
     if table.ndim != 2 or table.shape[1] != 2:
         raise ValueError("must be a list of pairs [penetration m, force N]")
     if len(table) > MOST_GIVEN:
         raise ValueError(f"a loading curve takes 2 to {MOST_GIVEN} knots, given {len(table)}")
-    return ForceCurve(table[:, 0].copy(), table[:, 1].copy(), unloading_ratio, damping)
+    curve = ForceCurve(table[:, 0].copy(), table[:, 1].copy(), unloading_ratio, damping)
+    steep = np.diff(curve.force) > STEEPEST * np.diff(curve.penetration)
+    if steep.any():
+        k = int(steep.argmax())
+        raise ValueError(
+            f"a loading curve rises by {STEEPEST:g} N/m at most, given {knots[k]} to {knots[k + 1]}"
+        )
+    return curve
 
 
 def read_corridor(row: Mapping[str, Any]) -> Corridor:

@@ -6,7 +6,8 @@ or sampled like any other input. An effect acts at one stage of a run:
 
 - ``inputs``: on the values of the model's inputs, before anything is built;
 - ``curve``: on the loading curve of the hood that the head strikes;
-- ``contact``: on the other properties of the contact (rate dependence, moving mass, the rig's guide);
+- ``contact``: on the other properties of the contact (rate dependence, moving mass) and the guide
+  of the rig;
 - ``braking``, ``posture``, ``road``: on the car's motion, the pedestrian's posture and the road of
   a crash;
 - ``signal``: on the accelerometer reading.

@@ -96,6 +96,7 @@ def test_nominal_values_are_those_of_the_option() -> None:
         ({"hood_curve": [[0.0, 0.0], [0.1]]}, "hood_curve: "),
         ({"hood_curve": [[0.0, 10.0], [0.1, 1e4]]}, r"hood_curve: .*\(0, 0\)"),
         ({"hood_curve": [[0.0, 0.0], [0.1, 1e4], [0.2, 9e3]]}, "hood_curve: .*rises"),
+        ({"hood_curve": [[0.0, 0.0], [5e-324, 1.0]]}, "hood_curve: .*1e.12 N/m at most"),
         ({"hood_curve": [[0.0, 0.0], [0.1, math.nan]]}, "hood_curve: .*finite"),
         ({"hood_curve": [[0.01 * k, 100.0 * k] for k in range(17)]}, "hood_curve: .*2 to 16"),
         ({"hood_curve": "steel"}, "hood_curve: "),

@@ -113,6 +113,18 @@ def test_every_point_has_the_same_draws(tmp_path: Path) -> None:
     assert all(masses == points.iloc[0] for masses in points)
 
 
+@pytest.mark.parametrize("points", [None, 0, True, 2.5])
+def test_a_manifest_without_its_points_is_told(tmp_path: Path, points: object) -> None:
+    folder = ResultsFolder(tmp_path / "map")
+    with by_formula():
+        run_text(study_text("map", outputs=("hic15",)), folder)
+    manifest = folder.read_json("manifest.json")
+    manifest["design"]["points"] = points
+    folder.write_json("manifest.json", manifest)
+    said = told(mcstudy("report", folder.path))
+    assert "manifest.json: design.points must be a whole number above 0" in said
+
+
 def test_bands_are_named_from_the_lowest() -> None:
     assert band_names([650.0, 1000.5]) == ["up to 650", "650 to 1000.5", "above 1000.5"]
 

@@ -46,7 +46,7 @@ class ApartRun:
 
     run: int
     values: Sequence[Real]
-    inputs: Mapping[str, float]
+    inputs: Mapping[str, Real]
 
 
 @dataclass(frozen=True)

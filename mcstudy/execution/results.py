@@ -169,8 +169,13 @@ class ResultsFolder:
             counts.update(runs["status"][runs["run"] < design["n"]].astype(str).tolist())
         return counts.total(), dict(counts.most_common())
 
-    def design(self) -> dict[str, Any]:
+    def design(self, *counts: str) -> dict[str, Any]:
         """Return the design from the manifest: at least ``n``, ``block`` and ``cells``.
+
+        Parameters
+        ----------
+        *counts : str
+            Further whole numbers that it must have.
 
         Raises
         ------
@@ -182,7 +187,7 @@ class ResultsFolder:
         if not isinstance(design, dict):
             raise UserError(f"{place}: has no table 'design'")
         found: dict[str, Any] = {"block": 1, "cells": []} | design
-        for key in ("n", "block"):
+        for key in ("n", "block", *counts):
             value = found.get(key)
             if not isinstance(value, int) or isinstance(value, bool) or not 0 < value < 2**53:
                 raise UserError(f"{place}: design.{key} must be a whole number above 0")

@@ -84,11 +84,7 @@ class ResponseMap(StudyKind[MapStudy, RunPlan, ModelRuns, MapAnalysis]):
     def results(self, study: MapStudy, folder: ResultsFolder) -> ModelRuns:
         """Return the model and the runs of the draws that are whole."""
         model = load_study_model(study)
-        points = folder.design().get("points")
-        if not isinstance(points, int) or isinstance(points, bool) or points < 1:
-            raise UserError(
-                f"{folder.path / 'manifest.json'}: design.points must be a whole number above 0"
-            )
+        points = folder.design("points")["points"]
         runs = folder.runs(columns_of(model))
         runs = runs[runs["run"] < study.design.n * points]
         done = np.bincount(runs["run"] // points, minlength=study.design.n) == points
